@@ -1,0 +1,26 @@
+#pragma once
+// Meshes on disk: any format assimp reads, binary PLY and binary glTF written.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/mesh.h"
+
+namespace rugae {
+
+/// Reads all triangles of any file assimp reads, coordinates times `mm_per_unit`; vertices at the
+/// same place are joined. Throws Error: missing file, "mesh.ply: no triangles ...", "mesh.ply:
+/// vertex 12 is not finite", unreadable format.
+TriangleMesh read_mesh(const std::filesystem::path& file, double mm_per_unit = 1.0);
+
+/// Binary little-endian PLY: float or double x y z (double when `precise`), nx ny nz and red green
+/// blue when present.
+void write_ply(const std::filesystem::path& file, const TriangleMesh& mesh, bool precise = false);
+
+/// glTF 2.0 binary (.glb): positions in metres (the format's unit) with the node scaled back so
+/// that viewers agree, normals, COLOR_0 when present, y-up as stored. One mesh, double-sided
+/// material. Written through tinygltf.
+void write_glb(const std::filesystem::path& file, const TriangleMesh& mesh);
+
+}  // namespace rugae

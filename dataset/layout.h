@@ -1,0 +1,54 @@
+#pragma once
+// Where everything in a dataset lies. Observations and truth never share a folder.
+//
+//   DATASET/
+//     dataset.json                what made it: version, scene, camera, trajectory, seed, frames,
+//     units, axes manifest.sha256             "hash  path" a line, as sha256sum prints and checks;
+//     written last: its presence says complete observations/               what a real capsule
+//     would give
+//       calibration.yaml          the lens (cameras/camera.h); vignetting is not in it
+//       frames.csv                index,time_s,exposure_s,gain
+//       frames/000000.png         8-bit sRGB
+//     truth/
+//       camera.yaml               everything about the camera
+//       trajectory.txt            TUM, world_from_camera, mm
+//       wall.ply                  the wall, double precision
+//       depth/000000.exr          z-depth in mm, float32, NaN where nothing was hit
+//       normals/000000.*          unit geometric normal in camera axes, facing the camera
+//       flow/000000.exr           channels x y: float32 px from frame t to t+1 (absent for the last
+//       frame), NaN where invalid masks/000000.png          bits: see FrameMask
+
+#include <filesystem>
+#include <string>
+
+namespace rugae {
+
+/// Bits of truth/masks: 8-bit single channel PNG.
+enum FrameMask : unsigned char {
+  kMaskValid = 1,          // the ray met the wall; all labels hold
+  kMaskSpecular = 2,       // wet-layer reflection adds more than a fixed share of the pixel's light
+  kMaskSaturated = 4,      // a channel reached the top of the ADC
+  kMaskFlowValid = 8,      // the wall point projects into frame t+1's image
+  kMaskFlowOccluded = 16,  // ... but is hidden there by other wall
+};
+
+struct DatasetLayout {
+  std::filesystem::path root;
+
+  std::filesystem::path info() const { return root / "dataset.json"; }
+  std::filesystem::path manifest() const { return root / "manifest.sha256"; }
+  std::filesystem::path observations() const { return root / "observations"; }
+  std::filesystem::path calibration() const { return observations() / "calibration.yaml"; }
+  std::filesystem::path frame_list() const { return observations() / "frames.csv"; }
+  std::filesystem::path frame(int index) const;
+  std::filesystem::path truth() const { return root / "truth"; }
+  std::filesystem::path camera() const { return truth() / "camera.yaml"; }
+  std::filesystem::path trajectory() const { return truth() / "trajectory.txt"; }
+  std::filesystem::path wall() const { return truth() / "wall.ply"; }
+  std::filesystem::path depth(int index) const;
+  std::filesystem::path normals(int index) const;
+  std::filesystem::path flow(int index) const;
+  std::filesystem::path masks(int index) const;
+};
+
+}  // namespace rugae

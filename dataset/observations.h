@@ -1,0 +1,40 @@
+#pragma once
+// What reconstruction may read: frames, times and a calibration. Nothing here can reach the truth.
+
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "cameras/camera.h"
+
+namespace rugae {
+
+class Observations {
+ public:
+  /// A dataset's folder (its observations/ part is used), an observations folder itself, or a plain
+  /// folder of images (PNG, JPEG, BMP; by natural order of names) together with a calibration file.
+  /// `calibration` overrides the dataset's own. Times come from frames.csv; a plain folder gets
+  /// index / `fps`. Throws Error for an empty folder, a missing calibration
+  /// ("... give one with --calibration"), images of another size than the lens, fewer than two
+  /// frames.
+  static Observations open(const std::filesystem::path& folder,
+                           const std::filesystem::path& calibration = {}, double fps = 30.0);
+
+  int size() const { return static_cast<int>(files_.size()); }
+  const Lens& lens() const { return lens_; }
+  double time_s(int index) const { return times_s_[index]; }
+  const std::filesystem::path& file(int index) const { return files_[index]; }
+  /// CV_8UC3, BGR; read from disk at each call (memory does not grow with the number of frames);
+  /// checked against the lens' size.
+  cv::Mat image(int index) const;
+  const std::string& name() const { return name_; }
+
+ private:
+  std::string name_;
+  Lens lens_;
+  std::vector<std::filesystem::path> files_;
+  std::vector<double> times_s_;
+};
+
+}  // namespace rugae

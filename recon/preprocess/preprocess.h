@@ -1,0 +1,50 @@
+#pragma once
+// The paper's section 2.1, frame by frame: reflections, undistortion, de-vignetting.
+
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <vector>
+
+#include "cameras/camera.h"
+#include "dataset/observations.h"
+#include "recon/options.h"
+
+namespace rugae {
+
+/// A frame as the stages after preprocessing see it. All images are on the pixel grid of
+/// `FrameSource::lens()`, a pinhole.
+struct Frame {
+  int index = -1;
+  cv::Mat gray;        // CV_8U, for pose
+  cv::Mat map_bgr;     // CV_8UC3, for the map
+  cv::Mat reflection;  // CV_8U, 255 where a reflection was detected
+  cv::Mat valid;       // CV_8U, 255 where undistortion had an original pixel to take
+};
+
+/// Reads and preprocesses frames on demand (memory does not grow with their number; a small cache
+/// holds the latest). Calls are thread-safe. De-vignetting: the profile is estimated once, from
+/// frames spread over the sequence.
+class FrameSource {
+ public:
+  FrameSource(const Observations& observations, const PreprocessOptions& options);
+  ~FrameSource();
+
+  int size() const;
+  /// The lens of the preprocessed frames: the observations' lens without distortion (as it is when
+  /// undistortion is off).
+  const Lens& lens() const;
+  const Observations& observations() const;
+  Frame frame(int index) const;
+  /// Only `gray`: what key frame selection and resection need.
+  cv::Mat gray(int index) const;
+  /// B(r): the estimated vignetting profile, V at r = 0 .. 1 in equal steps (1 = half the
+  /// diagonal); empty when switched off.
+  const std::vector<double>& vignetting_profile() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace rugae

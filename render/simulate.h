@@ -1,0 +1,39 @@
+#pragma once
+// The loop over frames: scene, camera and trajectory in, dataset out.
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "core/progress.h"
+
+namespace rugae {
+
+struct SimulateOptions {
+  std::string scene = "stomach";        // preset, YAML or mesh file
+  std::string camera = "misumi-v5506";  // preset or YAML
+  std::string trajectory = "1";         // preset or YAML
+  std::string resolution = "medium";
+  int frames = 0;       // 0: as many as in the paper for this camera and trajectory
+  int only_frame = -1;  // replays a single frame
+  std::uint64_t seed = 1;
+  bool noise = true;  // shot and read noise
+  bool vignetting = true;
+  bool labels = true;  // truth images
+  int threads = 0;     // 0: all
+  void check() const;
+};
+
+struct SimulateResult {
+  int frames = 0, skipped = 0;  // skipped: found finished from an earlier run
+  double path_length_mm = 0.0, min_clearance_mm = 0.0;
+  double trace_s = 0.0, shade_s = 0.0, label_s = 0.0, sensor_s = 0.0,
+         encode_s = 0.0;  // thread-seconds; encode includes writing
+  double write_s = 0.0;
+  double wall_s = 0.0;  // of the frame loop, by the clock
+};
+
+SimulateResult simulate(const SimulateOptions& options, const std::filesystem::path& out,
+                        Progress& progress);
+
+}  // namespace rugae

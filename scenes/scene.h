@@ -1,0 +1,84 @@
+#pragma once
+// A scene is a wall and what it is made of.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/mesh.h"
+
+namespace rugae {
+
+/// Anatomical regions along the stomach; `unknown` for imported meshes without labels.
+enum class Region : std::uint8_t {
+  unknown,
+  cardia,
+  fundus,
+  body,
+  incisura,
+  antrum,
+  pylorus,
+  oesophagus,
+  duodenum
+};
+std::string region_name(Region region);
+
+/// What light meets at one point of the wall. Linear RGB.
+struct MucosaSample {
+  Vec3f albedo = Vec3f::Constant(0.5f);  // Lambertian
+  float roughness = 0.2f;                // GGX alpha of the wet layer
+  float coverage = 1.0f;                 // share of the surface under the wet layer, 0 to 1
+  float f0 = 0.02f;                      // Fresnel reflectance at normal incidence
+  Vec3f coat_gradient =
+      Vec3f::Zero();  // of the wet layer's height (dimensionless slope, in world axes); tilts its
+                      // normal: n_coat = normalize(n - tangential part of the gradient)
+};
+
+struct MucosaOptions {
+  Vec3 base_albedo{0.62, 0.28, 0.20};  // replaced by the preset
+  double vessel_contrast = 0.25;
+  double mottle_contrast = 0.2;
+  double wetness = 0.6;
+  double oil = 0.0;  // 0 to 1: coverage and smoothness of an oil film (trajectory 6)
+  void check(const std::string& where) const;
+};
+
+/// The mucosa as a pure function of the rest position, so that no UV map is needed and deformation
+/// carries it along.
+class Mucosa {
+ public:
+  Mucosa(const MucosaOptions& options, std::uint64_t seed);
+  /// `footprint_mm` is the width of a pixel on the wall: detail finer than twice that is faded out.
+  MucosaSample sample(const Vec3f& rest_position_mm, const Vec3f& normal, Region region,
+                      float footprint_mm) const;
+
+ private:
+  MucosaOptions options_;
+  std::uint64_t seed_;
+};
+
+struct Scene {
+  std::string name;
+  TriangleMesh wall;                 // with vertex normals
+  std::vector<Vec3> rest_positions;  // of the vertices; what the mucosa is a function of
+  std::vector<Region> regions;       // of the vertices
+  Mucosa mucosa;
+  std::uint64_t seed = 1;
+};
+
+/// A preset name, a YAML file, or any mesh file that assimp reads (units by `mm_per_unit` in YAML;
+/// a bare mesh file must be in millimetres and is checked to be of the size of an organ). `seed`
+/// draws relief and mucosa. `resolution` is "coarse", "medium" or "fine" (about 50k, 250k, 1M
+/// triangles).
+struct SceneRequest {
+  std::string name_or_path = "stomach";
+  std::uint64_t seed = 1;
+  std::string resolution = "medium";
+  double oil = 0.0;
+};
+Scene load_scene(const SceneRequest& request);
+
+}  // namespace rugae
