@@ -49,6 +49,17 @@ struct Lens {
   void check(const std::string& where) const;
 };
 
+/// Lens::project for many points: what the model's limit costs is paid once.
+class LensProjector {
+ public:
+  explicit LensProjector(const Lens& lens);
+  std::optional<Vec2> project(const Vec3& p_cam) const;
+
+ private:
+  Lens lens_;
+  double cos_limit_;
+};
+
 /// Light fall-off at angle theta and radius r (distance from the principal point over half the
 /// image diagonal): cos^4(theta)^(c) (1 + v1 r^2 + v2 r^4 + v3 r^6), c being 1 or 0.
 struct Vignetting {

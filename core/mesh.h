@@ -46,6 +46,9 @@ struct EdgeReport {
   bool closed() const { return open == 0 && non_manifold == 0; }
 };
 EdgeReport inspect_edges(const TriangleMesh& mesh);
+/// Of each triangle, the triangle beyond its edge k (from corner k to corner k + 1); -1 where the
+/// edge is open or used by more than two triangles.
+std::vector<Vec3i> edge_neighbours(const TriangleMesh& mesh);
 /// Triangles grouped by edge connectivity; each entry is a component's triangle indices, largest
 /// first.
 std::vector<std::vector<int>> connected_components(const TriangleMesh& mesh);

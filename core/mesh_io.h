@@ -18,9 +18,8 @@ TriangleMesh read_mesh(const std::filesystem::path& file, double mm_per_unit = 1
 /// blue when present.
 void write_ply(const std::filesystem::path& file, const TriangleMesh& mesh, bool precise = false);
 
-/// glTF 2.0 binary (.glb): positions in metres (the format's unit) with the node scaled back so
-/// that viewers agree, normals, COLOR_0 when present, y-up as stored. One mesh, double-sided
-/// material. Written through tinygltf.
+/// glTF 2.0 binary (.glb) through tinygltf: positions in metres (the unit the format demands),
+/// normals, linear COLOR_0 when colours are present, one double-sided material; axes as stored.
 void write_glb(const std::filesystem::path& file, const TriangleMesh& mesh);
 
 }  // namespace rugae

@@ -1,0 +1,164 @@
+#include "cameras/camera.h"
+
+#include <cmath>
+
+#include "core/check.h"
+#include "core/presets.h"
+#include "core/units.h"
+#include "core/yaml.h"
+
+namespace rugae {
+namespace {
+
+const std::vector<std::string> kLensModels = {"brown_conrady", "kannala_brandt"};
+const std::vector<std::string> kShutters = {"global", "rolling"};
+
+// fx so that the ray through the middle of the left border makes half the horizontal field of view
+// with the axis. For Brown-Conrady the border lies at the distorted radius of tan(fov / 2), for
+// Kannala-Brandt at theta_d(fov / 2).
+double focal_for_fov(Lens lens, double fov_rad) {
+  lens.fx = lens.fy = 1.0;
+  lens.cx = lens.cy = 0.0;
+  const double half = 0.5 * fov_rad;
+  const auto border = lens.project(Vec3(std::sin(half), 0.0, std::cos(half)));
+  check(border.has_value(),
+        "a horizontal field of view of {} degrees is beyond the distortion's turning point",
+        deg_from_rad(fov_rad));
+  return 0.5 * lens.width / border->x();
+}
+
+Lens read_lens(YamlReader yaml, const std::string& place) {
+  Lens lens;
+  int model = 0;
+  yaml.get_choice("model", kLensModels, model);
+  lens.model = static_cast<LensModel>(model);
+  yaml.require("width", lens.width);
+  yaml.require("height", lens.height);
+  check(lens.width > 0 && lens.height > 0, "{}: image size is {} x {}, expected above 0", place,
+        lens.width, lens.height);
+  yaml.get("k1", lens.k1);
+  yaml.get("k2", lens.k2);
+  yaml.get("k3", lens.k3);
+  if (lens.model == LensModel::kannala_brandt) {
+    yaml.get("k4", lens.k4);
+  } else {
+    yaml.get("p1", lens.p1);
+    yaml.get("p2", lens.p2);
+  }
+  lens.cx = 0.5 * lens.width;
+  lens.cy = 0.5 * lens.height;
+  yaml.get("cx", lens.cx);
+  yaml.get("cy", lens.cy);
+  if (yaml.has("horizontal_fov_deg")) {
+    check(!yaml.has("fx") && !yaml.has("fy"),
+          "{}: horizontal_fov_deg and fx, fy exclude each other", yaml.where("horizontal_fov_deg"));
+    double fov_rad = 0.0;
+    yaml.get_deg("horizontal_fov_deg", fov_rad);
+    check(fov_rad > 0.0 && fov_rad < 2.0 * kPi,
+          "{}: horizontal_fov_deg is {}, expected above 0 and below 360",
+          yaml.where("horizontal_fov_deg"), deg_from_rad(fov_rad));
+    lens.fx = lens.fy = focal_for_fov(lens, fov_rad);
+  } else {
+    yaml.require("fx", lens.fx);
+    yaml.require("fy", lens.fy);
+  }
+  yaml.finish();
+  lens.check(place);
+  return lens;
+}
+
+Sensor read_sensor(YamlReader yaml) {
+  Sensor sensor;
+  yaml.require("pixel_pitch_um", sensor.pixel_pitch_um);
+  yaml.require("fps", sensor.fps);
+  yaml.require("bit_depth", sensor.bit_depth);
+  yaml.require("full_well_e", sensor.full_well_e);
+  yaml.require("read_noise_e", sensor.read_noise_e);
+  int shutter = 0;
+  yaml.get_choice("shutter", kShutters, shutter);
+  sensor.shutter = static_cast<Shutter>(shutter);
+  const auto positive = [&yaml](const char* key, double value) {
+    check(value > 0.0, "{}: {} is {}, expected above 0", yaml.where(key), key, value);
+  };
+  positive("pixel_pitch_um", sensor.pixel_pitch_um);
+  positive("fps", sensor.fps);
+  positive("full_well_e", sensor.full_well_e);
+  check(sensor.read_noise_e >= 0.0, "{}: read_noise_e is {}, expected at least 0",
+        yaml.where("read_noise_e"), sensor.read_noise_e);
+  check(sensor.bit_depth >= 8 && sensor.bit_depth <= 16, "{}: bit_depth is {}, expected 8 to 16",
+        yaml.where("bit_depth"), sensor.bit_depth);
+  yaml.finish();
+  return sensor;
+}
+
+}  // namespace
+
+Camera load_camera(const std::string& name_or_path) {
+  const auto file = find_preset("cameras", "camera", name_or_path);
+  YamlReader yaml = YamlReader::from_file(file);
+  Camera camera;
+  camera.name = file.stem().string();
+  yaml.get("name", camera.name);
+  yaml.get("diameter_mm", camera.diameter_mm);
+  yaml.get("frames_in_paper", camera.frames_in_paper);
+  check(camera.diameter_mm >= 0.0, "{}: diameter_mm is {}, expected at least 0",
+        yaml.where("diameter_mm"), camera.diameter_mm);
+  check(camera.frames_in_paper >= 0, "{}: frames_in_paper is {}, expected at least 0",
+        yaml.where("frames_in_paper"), camera.frames_in_paper);
+  const std::string lens_place = yaml.where("lens");
+  const auto lens = yaml.child("lens");
+  check(lens.has_value(), "{}: key 'lens' is missing", lens_place);
+  camera.lens = read_lens(*lens, lens_place);
+  if (auto vignetting = yaml.child("vignetting")) {
+    vignetting->get("cos4", camera.vignetting.cos4);
+    vignetting->get("v1", camera.vignetting.v1);
+    vignetting->get("v2", camera.vignetting.v2);
+    vignetting->get("v3", camera.vignetting.v3);
+    vignetting->finish();
+  }
+  const auto sensor = yaml.child("sensor");
+  check(sensor.has_value(), "{}: key 'sensor' is missing", yaml.where("sensor"));
+  camera.sensor = read_sensor(*sensor);
+  yaml.finish();
+  const double w = camera.lens.width, h = camera.lens.height;
+  for (const Vec2& corner : {Vec2(0, 0), Vec2(w, 0), Vec2(0, h), Vec2(w, h)})
+    check(vignette_at(camera.vignetting, camera.lens, corner) > 0.0,
+          "{}: vignetting leaves no light at the image corner ({}, {})", yaml.where("vignetting"),
+          corner.x(), corner.y());
+  return camera;
+}
+
+int frames_of_trajectory(const Camera& camera, int trajectory) {
+  check(trajectory >= 1 && trajectory <= 6, "trajectory {}: the paper has 1 to 6", trajectory);
+  return camera.frames_in_paper / 6 + (trajectory <= camera.frames_in_paper % 6 ? 1 : 0);
+}
+
+Lens load_lens(const std::filesystem::path& file) {
+  return read_lens(YamlReader::from_file(file), file.string());
+}
+
+std::string lens_yaml(const Lens& lens, const std::string& comment) {
+  std::string text = comment.empty() ? "" : "# " + comment + "\n";
+  text += "# pixels; the centre of the first pixel is (0.5, 0.5)\n";
+  text += fmt::format("model: {}\nwidth: {}\nheight: {}\n",
+                      kLensModels[static_cast<int>(lens.model)], lens.width, lens.height);
+  const auto number = [&text](const char* key, double value) {
+    text += fmt::format("{}: {:.17g}\n", key, value);
+  };
+  number("fx", lens.fx);
+  number("fy", lens.fy);
+  number("cx", lens.cx);
+  number("cy", lens.cy);
+  number("k1", lens.k1);
+  number("k2", lens.k2);
+  number("k3", lens.k3);
+  if (lens.model == LensModel::kannala_brandt) {
+    number("k4", lens.k4);
+  } else {
+    number("p1", lens.p1);
+    number("p2", lens.p2);
+  }
+  return text;
+}
+
+}  // namespace rugae
