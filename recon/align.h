@@ -2,6 +2,7 @@
 // Pairwise alignment, the paper's algorithm 3, steps 2 to 6: Farneback matches, RANSAC homography,
 // then Gauss-Newton on the affine parameters over circular patches at the inliers.
 
+#include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <vector>
@@ -16,6 +17,8 @@ struct PairAlignment {
   int reference = -1, moving = -1;  // frame indices
   std::vector<Vec2> reference_px,
       moving_px;  // inlier correspondences, (0.5, 0.5) convention, preprocessed frames
+  std::vector<int> point_index;  // of each correspondence: its place in
+                                 // AlignGuess::reference_points; empty when a grid was followed
   Mat3 ref_from_mov_homography = Mat3::Identity();
   Eigen::Matrix<double, 2, 3> ref_from_mov_affine =
       Eigen::Matrix<double, 2, 3>::Identity();  // refined
@@ -24,8 +27,21 @@ struct PairAlignment {
   bool converged = false;
 };
 
-/// Empty when the pair cannot be aligned (too few inliers).
+/// What the caller knows of a pair beforehand.
+struct AlignGuess {
+  /// Follow these points of the reference (they need not be integer pixels) instead of a grid, so
+  /// that tracks chain over many key frames. Points outside the image are never inliers.
+  std::vector<Vec2> reference_points;
+  cv::Mat flow;  // CV_32FC2, px, a first guess of the flow from reference to moving; may be empty
+};
+
+/// Empty when the pair cannot be aligned (too few inliers). Correspondences are forward-backward
+/// consistent flow at the grid or the given points, never on a reflection or an invalid pixel. One
+/// plane cannot hold a cavity: after the first homography (the one reported) further homographies
+/// are taken from what the earlier ones left, while they find at least `min_inliers`; the inliers
+/// of all of them are returned.
 std::optional<PairAlignment> align(const Frame& reference, const Frame& moving,
-                                   const AlignOptions& options, std::uint64_t seed);
+                                   const AlignOptions& options, std::uint64_t seed,
+                                   const AlignGuess& guess = {});
 
 }  // namespace rugae
