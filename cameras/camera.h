@@ -54,9 +54,11 @@ class LensProjector {
  public:
   explicit LensProjector(const Lens& lens);
   std::optional<Vec2> project(const Vec3& p_cam) const;
+  std::optional<Vec3> unproject(const Vec2& pixel) const;
 
  private:
   Lens lens_;
+  double max_angle_rad_;
   double cos_limit_;
 };
 
@@ -68,6 +70,9 @@ struct Vignetting {
 };
 /// Relative light at a pixel, 1 on the axis.
 double vignette_at(const Vignetting& vignetting, const Lens& lens, const Vec2& pixel);
+/// The same where the pixel's unit ray is known already.
+double vignette_at(const Vignetting& vignetting, const Lens& lens, const Vec2& pixel,
+                   const Vec3& ray);
 
 enum class Shutter { global, rolling };
 

@@ -64,8 +64,8 @@ double kannala_brandt_slope(const Lens& lens, double theta) {
 
 // Newton's method from a start inside the monotonic region; the step is halved while it leaves the
 // region or makes the residual grow, so that the wanted root is the one found.
-std::optional<Vec2> undistort(const Lens& lens, const Vec2& target) {
-  const double limit = std::tan(lens.max_angle_rad());
+std::optional<Vec2> undistort(const Lens& lens, double max_angle_rad, const Vec2& target) {
+  const double limit = std::tan(max_angle_rad);
   Vec2 n = target;
   // The radial part alone gives a start inside the region for any strength of barrel or pincushion.
   const double r_target = target.norm();
@@ -123,34 +123,38 @@ std::optional<Vec2> Lens::project(const Vec3& p_cam) const {
 }
 
 std::optional<Vec3> Lens::unproject(const Vec2& pixel) const {
-  const Vec2 d((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
+  return LensProjector(*this).unproject(pixel);
+}
+
+std::optional<Vec3> LensProjector::unproject(const Vec2& pixel) const {
+  const Vec2 d((pixel.x() - lens_.cx) / lens_.fx, (pixel.y() - lens_.cy) / lens_.fy);
   if (!d.allFinite()) return std::nullopt;
-  if (model == LensModel::brown_conrady) {
-    const auto n = undistort(*this, d);
+  if (lens_.model == LensModel::brown_conrady) {
+    const auto n = undistort(lens_, max_angle_rad_, d);
     if (!n) return std::nullopt;
     return Vec3(n->x(), n->y(), 1.0).normalized();
   }
   const double theta_d = d.norm();
   if (theta_d == 0.0) return Vec3::UnitZ();
-  const double limit = max_angle_rad();
-  if (!(theta_d <= kannala_brandt(*this, limit))) return std::nullopt;
+  const double limit = max_angle_rad_;
+  if (!(theta_d <= kannala_brandt(lens_, limit))) return std::nullopt;
   double low = 0.0, high = limit, theta = std::min(theta_d, limit);
   for (int step = 0; step < kNewtonSteps; ++step) {
-    const double residual = kannala_brandt(*this, theta) - theta_d;
+    const double residual = kannala_brandt(lens_, theta) - theta_d;
     (residual > 0.0 ? high : low) = theta;
-    double next = theta - residual / kannala_brandt_slope(*this, theta);
+    double next = theta - residual / kannala_brandt_slope(lens_, theta);
     if (!(next >= low && next <= high)) next = 0.5 * (low + high);
     const double change = std::abs(next - theta);
     theta = next;
     if (change <= 1e-16 * limit) break;
   }
-  if (!(std::abs(kannala_brandt(*this, theta) - theta_d) <= kNewtonTolerance)) return std::nullopt;
+  if (!(std::abs(kannala_brandt(lens_, theta) - theta_d) <= kNewtonTolerance)) return std::nullopt;
   const double s = std::sin(theta) / theta_d;
   return Vec3(s * d.x(), s * d.y(), std::cos(theta));
 }
 
 LensProjector::LensProjector(const Lens& lens)
-    : lens_(lens), cos_limit_(std::cos(lens.max_angle_rad())) {}
+    : lens_(lens), max_angle_rad_(lens.max_angle_rad()), cos_limit_(std::cos(max_angle_rad_)) {}
 
 std::optional<Vec2> LensProjector::project(const Vec3& p) const {
   const double norm = p.norm();
@@ -201,12 +205,16 @@ void Lens::check(const std::string& where) const {
 
 double vignette_at(const Vignetting& vignetting, const Lens& lens, const Vec2& pixel) {
   const auto ray = lens.unproject(pixel);
-  if (!ray) return 0.0;
+  return ray ? vignette_at(vignetting, lens, pixel, *ray) : 0.0;
+}
+
+double vignette_at(const Vignetting& vignetting, const Lens& lens, const Vec2& pixel,
+                   const Vec3& ray) {
   const double half_diagonal = 0.5 * std::hypot(lens.width, lens.height);
   const double r2 =
       (pixel - Vec2(lens.cx, lens.cy)).squaredNorm() / (half_diagonal * half_diagonal);
   const double polynomial = 1.0 + r2 * (vignetting.v1 + r2 * (vignetting.v2 + r2 * vignetting.v3));
-  const double cos2 = ray->z() * ray->z();
+  const double cos2 = ray.z() * ray.z();
   return (vignetting.cos4 ? cos2 * cos2 : 1.0) * polynomial;
 }
 
