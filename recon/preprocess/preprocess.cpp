@@ -1,0 +1,151 @@
+#include "recon/preprocess/preprocess.h"
+
+#include <algorithm>
+#include <list>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/check.h"
+#include "recon/preprocess/devignette.h"
+#include "recon/preprocess/reflections.h"
+#include "recon/preprocess/undistort.h"
+
+namespace rugae {
+namespace {
+
+constexpr int kVignettingFrames = 16;  // spread over the sequence
+constexpr int kProfileSamples = 257;   // of the published profile
+constexpr std::size_t kCachedFrames = 6;
+constexpr std::size_t kCachedGrays = 24;
+
+// The values computed last, newest first.
+template <typename T>
+class Cache {
+ public:
+  explicit Cache(std::size_t capacity) : capacity_(capacity) {}
+
+  template <typename Make>
+  T get(int index, Make make) {
+    {
+      const std::lock_guard lock(mutex_);
+      for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
+        if (entry->first != index) continue;
+        entries_.splice(entries_.begin(), entries_, entry);
+        return entries_.front().second;
+      }
+    }
+    T value = make();  // outside the lock: two threads may make the same value, never wait
+    const std::lock_guard lock(mutex_);
+    entries_.emplace_front(index, value);
+    if (entries_.size() > capacity_) entries_.pop_back();
+    return value;
+  }
+
+ private:
+  std::size_t capacity_;
+  std::mutex mutex_;
+  std::list<std::pair<int, T>> entries_;
+};
+
+}  // namespace
+
+struct FrameSource::Impl {
+  Observations observations;
+  PreprocessOptions options;
+  Lens lens;
+  std::optional<Undistortion> undistortion;
+  cv::Mat valid;
+  cv::Mat gain;  // 1 / V; empty when switched off
+  std::vector<double> profile;
+  Cache<Frame> frames{kCachedFrames};
+  Cache<cv::Mat> grays{kCachedGrays};
+
+  Impl(const Observations& source, const PreprocessOptions& chosen)
+      : observations(source), options(chosen), lens(source.lens()) {
+    options.check();
+    if (options.undistort) {
+      lens = observations.lens().pinhole();
+      undistortion.emplace(observations.lens(), lens);
+      valid = undistortion->valid();
+    } else {
+      valid = cv::Mat(lens.height, lens.width, CV_8U, cv::Scalar(255));
+    }
+    if (options.devignette) estimate_gain();
+  }
+
+  cv::Mat move(const cv::Mat& image) const {
+    return undistortion ? undistortion->image(image) : image;
+  }
+  cv::Mat move_mask(const cv::Mat& mask) const {
+    return undistortion ? undistortion->mask(mask) : mask;
+  }
+  cv::Mat correct(const cv::Mat& image) const {
+    return gain.empty() ? image : apply_gain(image, gain);
+  }
+  cv::Mat gray_of(const cv::Mat& bgr) const {
+    cv::Mat gray;
+    cv::cvtColor(bgr, gray, cv::COLOR_BGR2GRAY);
+    return gray;
+  }
+
+  void estimate_gain() {
+    const int count = std::min(kVignettingFrames, observations.size());
+    std::vector<cv::Mat> images, usable;
+    for (int i = 0; i < count; ++i) {
+      // The middle of the i-th of `count` equal parts of the sequence.
+      const int index = static_cast<int>((2LL * i + 1) * observations.size() / (2LL * count));
+      const cv::Mat gray = gray_of(observations.image(index));
+      images.push_back(move(gray));
+      const cv::Mat reflection = move_mask(detect_reflections(gray, options.reflections));
+      usable.push_back(valid & ~reflection);
+    }
+    const double reach_px = 0.5 * std::hypot(lens.width, lens.height);
+    const VignettingProfile found =
+        estimate_vignetting(images, usable, {lens.cx, lens.cy}, reach_px);
+    gain = vignetting_gain(found, lens.width, lens.height);
+    for (int k = 0; k < kProfileSamples; ++k)
+      profile.push_back(found.at(reach_px * k / (kProfileSamples - 1.0)));
+  }
+
+  cv::Mat make_gray(int index) const {
+    cv::Mat gray = gray_of(observations.image(index));
+    if (options.reflections.suppress_for_pose)
+      gray = suppress_reflections(gray, detect_reflections(gray, options.reflections),
+                                  options.reflections);
+    return correct(move(gray));
+  }
+
+  Frame make_frame(int index) const {
+    const cv::Mat bgr = observations.image(index);
+    const cv::Mat gray = gray_of(bgr);
+    const cv::Mat reflection = detect_reflections(gray, options.reflections);
+    const ReflectionOptions& chosen = options.reflections;
+    const cv::Mat pose =
+        chosen.suppress_for_pose ? suppress_reflections(gray, reflection, chosen) : gray;
+    const cv::Mat map =
+        chosen.suppress_for_map ? suppress_reflections(bgr, reflection, chosen) : bgr;
+    return {index, correct(move(pose)), correct(move(map)), move_mask(reflection), valid};
+  }
+};
+
+FrameSource::FrameSource(const Observations& observations, const PreprocessOptions& options)
+    : impl_(std::make_unique<Impl>(observations, options)) {}
+FrameSource::~FrameSource() = default;
+
+int FrameSource::size() const { return impl_->observations.size(); }
+const Lens& FrameSource::lens() const { return impl_->lens; }
+const Observations& FrameSource::observations() const { return impl_->observations; }
+const std::vector<double>& FrameSource::vignetting_profile() const { return impl_->profile; }
+
+Frame FrameSource::frame(int index) const {
+  check(index >= 0 && index < size(), "frame {} of {}: no such frame", index, size());
+  return impl_->frames.get(index, [&] { return impl_->make_frame(index); });
+}
+
+cv::Mat FrameSource::gray(int index) const {
+  check(index >= 0 && index < size(), "frame {} of {}: no such frame", index, size());
+  return impl_->grays.get(index, [&] { return impl_->make_gray(index); });
+}
+
+}  // namespace rugae

@@ -1,0 +1,44 @@
+#include "recon/preprocess/undistort.h"
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace rugae {
+namespace {
+
+constexpr float kNowherePx = -1e4F;  // far outside every image
+
+}  // namespace
+
+Undistortion::Undistortion(const Lens& from, const Lens& to)
+    : source_px_(to.height, to.width, CV_32FC2), valid_(to.height, to.width, CV_8U, cv::Scalar(0)) {
+  for (int y = 0; y < to.height; ++y) {
+    auto* row = source_px_.ptr<cv::Vec2f>(y);
+    for (int x = 0; x < to.width; ++x) {
+      row[x] = {kNowherePx, kNowherePx};
+      const std::optional<Vec3> ray = to.unproject({x + 0.5, y + 0.5});
+      if (!ray) continue;
+      const std::optional<Vec2> pixel = from.project(*ray);
+      if (!pixel) continue;
+      row[x] = {static_cast<float>(pixel->x() - 0.5), static_cast<float>(pixel->y() - 0.5)};
+      const bool inside = pixel->x() >= 0.5 && pixel->x() <= from.width - 0.5 &&
+                          pixel->y() >= 0.5 && pixel->y() <= from.height - 0.5;
+      if (inside) valid_.at<unsigned char>(y, x) = 255;
+    }
+  }
+}
+
+cv::Mat Undistortion::image(const cv::Mat& image) const {
+  cv::Mat moved;
+  cv::remap(image, moved, source_px_, {}, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  moved.setTo(0, valid_ == 0);
+  return moved;
+}
+
+cv::Mat Undistortion::mask(const cv::Mat& mask) const {
+  cv::Mat moved;
+  cv::remap(mask, moved, source_px_, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
+  return moved >= 128;
+}
+
+}  // namespace rugae
