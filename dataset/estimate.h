@@ -2,13 +2,17 @@
 // What a reconstruction leaves on disk; the only thing validation reads of it.
 //
 //   ESTIMATE/
-//     estimate.json               method, options, counts, converged, units ("map units" unless
-//     scale is known), stages with times trajectory.txt              TUM, world_from_camera of the
-//     tracked frames, in map units frames.csv                  index,time_s,state: keyframe |
-//     resected | lost lens.yaml                   the calibration used map.ply  map.glb the map,
-//     same world as trajectory.txt points.ply                  the sparse points of the bundle
-//     adjustment depth/000012.exr            z-depth in map units, on the pixel grid of the
-//     original (distorted) frame; NaN: unknown pictures/<stage>/<name>.png intermediates for people
+//     estimate.json              method, options, counts and errors, stages with times; written
+//     last trajectory.txt             TUM, world_from_camera of the tracked frames, in map units
+//     frames.csv                 index,time_s,state: keyframe | resected | lost
+//     lens.yaml                  the calibration used
+//     map.ply  map.glb           the map, same world as trajectory.txt
+//     points.ply                 the sparse points of the bundle adjustment
+//     depth/000012.exr           z-depth in map units, on the pixel grid of the original
+//     (distorted)
+//                                frame; NaN: unknown
+//     pictures/<stage>/<name>.png   intermediates for people
+// Map units are what the reconstruction chose: their length in mm is unknown unless it says so.
 
 #include <filesystem>
 #include <map>

@@ -1,22 +1,24 @@
 #pragma once
-// Where everything in a dataset lies. Observations and truth never share a folder.
+// Where everything in a dataset lies. Observations and truth never share a folder. Encodings:
+// docs/dataset.md.
 //
 //   DATASET/
-//     dataset.json                what made it: version, scene, camera, trajectory, seed, frames,
-//     units, axes manifest.sha256             "hash  path" a line, as sha256sum prints and checks;
-//     written last: its presence says complete observations/               what a real capsule
-//     would give
-//       calibration.yaml          the lens (cameras/camera.h); vignetting is not in it
-//       frames.csv                index,time_s,exposure_s,gain
-//       frames/000000.png         8-bit sRGB
+//     dataset.json              what made it: scene, camera, trajectory, seed, options, units, axes
+//     manifest.sha256           "hash  path" a line, as sha256sum prints and checks; written last:
+//                               its presence says complete
+//     observations/             what a real capsule would give
+//       calibration.yaml        the lens (cameras/camera.h); vignetting is not in it
+//       frames.csv              index,time_s,exposure_s,gain
+//       frames/000000.png       8-bit sRGB
 //     truth/
-//       camera.yaml               everything about the camera
-//       trajectory.txt            TUM, world_from_camera, mm
-//       wall.ply                  the wall, double precision
-//       depth/000000.exr          z-depth in mm, float32, NaN where nothing was hit
-//       normals/000000.*          unit geometric normal in camera axes, facing the camera
-//       flow/000000.exr           channels x y: float32 px from frame t to t+1 (absent for the last
-//       frame), NaN where invalid masks/000000.png          bits: see FrameMask
+//       camera.yaml             everything about the camera
+//       trajectory.txt          TUM, world_from_camera, mm
+//       wall.ply                the wall, double precision
+//       depth/000000.exr        z-depth in mm, float32, NaN where nothing was hit
+//       normals/000000.png      unit geometric normal in camera axes, facing the camera, 16-bit
+//       flow/000000.exr         channels x y: float32 px from frame t to t+1 (absent for the last
+//                               frame), NaN where not kMaskFlowValid
+//       masks/000000.png        bits: see FrameMask
 
 #include <filesystem>
 #include <string>
@@ -40,6 +42,7 @@ struct DatasetLayout {
   std::filesystem::path observations() const { return root / "observations"; }
   std::filesystem::path calibration() const { return observations() / "calibration.yaml"; }
   std::filesystem::path frame_list() const { return observations() / "frames.csv"; }
+  std::filesystem::path frames() const { return observations() / "frames"; }
   std::filesystem::path frame(int index) const;
   std::filesystem::path truth() const { return root / "truth"; }
   std::filesystem::path camera() const { return truth() / "camera.yaml"; }

@@ -10,6 +10,10 @@
 
 namespace rugae {
 
+/// Order of file names for people: runs of digits compare as numbers, so "f2.png" is before
+/// "f10.png".
+bool natural_less(const std::string& a, const std::string& b);
+
 class Observations {
  public:
   /// A dataset's folder (its observations/ part is used), an observations folder itself, or a plain

@@ -2,8 +2,10 @@
 // Writes a dataset so that a killed run goes on where it stopped, and the finished one is proven by
 // its manifest.
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "cameras/camera.h"
 #include "core/mesh.h"
@@ -18,33 +20,45 @@ struct DatasetInfo {
   std::string scene, camera, trajectory, resolution;
   std::uint64_t seed = 1;
   int frames = 0;
-  std::string
-      text;  // every option as canonical JSON: a folder begun with another text is not continued
+  bool labels = true;  // false: no truth images
+  std::string text;    // every option as a canonical JSON object: a folder begun with another text
+                       // is not continued
 };
+
+/// The text of dataset.json; throws Error when `info.text` is not JSON.
+std::string info_json(const DatasetInfo& info);
+/// Throws Error naming the file when it is missing, is not JSON, or lacks a field.
+DatasetInfo read_info(const std::filesystem::path& file);
 
 class DatasetWriter {
  public:
-  /// Creates the folders, or continues them when they were begun with the same info; throws Error
-  /// otherwise
-  /// ("...: holds another dataset (seed 1, now 2); choose another folder or remove it").
+  /// Creates the folders, or continues them when they were begun with the same info (what a killed
+  /// run left half written is removed); throws Error otherwise ("...: holds another dataset (seed
+  /// is 1, now 2); choose another folder or remove it"), and for a folder with other things in it.
   DatasetWriter(const std::filesystem::path& root, const DatasetInfo& info);
 
+  /// Throws Error when the track has not one pose a frame, or when an earlier run wrote another
+  /// one.
   void write_scene(const Camera& camera, const PoseTrack& track, const TriangleMesh& wall);
   /// True when all files of the frame are in place from an earlier run (files appear whole, so
   /// presence suffices).
   bool has_frame(int index) const;
   /// Safe to call from several threads for different frames. `bgr8` is the observation. The frame
-  /// image itself is published last.
+  /// image itself is published last. Without labels, `truth` is not looked at.
   void write_frame(int index, const cv::Mat& bgr8, const FrameTruth& truth) const;
-  /// frames.csv, then the manifest over every file. Only now is the dataset complete.
+  /// frames.csv, then the manifest over every file. Only now is the dataset complete. Throws Error
+  /// naming the first frame that was not written.
   void finish(const std::vector<double>& exposure_s, const std::vector<double>& gain) const;
 
   const DatasetLayout& layout() const { return layout_; }
 
  private:
+  bool has_flow(int index) const { return index + 1 < info_.frames; }
+
   DatasetLayout layout_;
   DatasetInfo info_;
   PoseTrack track_;
+  int width_ = 0, height_ = 0;  // px
 };
 
 }  // namespace rugae

@@ -1,0 +1,83 @@
+#include "dataset/image_whole.h"
+
+#include <zlib.h>
+
+#include <cstdint>
+
+#include "core/check.h"
+
+namespace rugae {
+namespace {
+
+using namespace std::string_view_literals;
+constexpr std::string_view kPngSignature = "\x89PNG\r\n\x1a\n"sv;
+constexpr std::string_view kJpegStart = "\xff\xd8\xff"sv;
+constexpr std::string_view kJpegScan = "\xff\xda"sv;
+constexpr std::string_view kJpegEnd = "\xff\xd9"sv;
+
+std::uint32_t byte_at(std::string_view bytes, std::size_t at) {
+  return static_cast<unsigned char>(bytes[at]);
+}
+std::uint32_t big_endian(std::string_view bytes, std::size_t at) {
+  return byte_at(bytes, at) << 24 | byte_at(bytes, at + 1) << 16 | byte_at(bytes, at + 2) << 8 |
+         byte_at(bytes, at + 3);
+}
+std::uint32_t little_endian(std::string_view bytes, std::size_t at) {
+  return byte_at(bytes, at) | byte_at(bytes, at + 1) << 8 | byte_at(bytes, at + 2) << 16 |
+         byte_at(bytes, at + 3) << 24;
+}
+
+// A PNG is a signature and chunks of length, type, data, CRC-32 of type and data; the last is IEND
+// (ISO/IEC 15948, section 5).
+bool png_is_whole(const std::string& name, std::string_view bytes) {
+  constexpr std::size_t kFrame = 12;  // length, type and checksum of a chunk
+  std::size_t at = kPngSignature.size();
+  while (at + kFrame <= bytes.size()) {
+    const std::size_t length = big_endian(bytes, at);
+    if (length > bytes.size() - at - kFrame) return false;
+    const std::string_view type = bytes.substr(at + 4, 4);
+    const auto crc = crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data() + at + 4), length + 4);
+    check(crc == big_endian(bytes, at + 8 + length),
+          "{}: damaged: the checksum of its {} chunk at byte {} does not match", name, type, at);
+    if (type == "IEND") return true;
+    at += kFrame + length;
+  }
+  return false;
+}
+
+// A byte 0xff within a scan's data is always followed by 0 or a restart marker, so an end marker
+// behind the last scan marker ends that scan (ITU-T T.81, annex B.1.1).
+bool jpeg_is_whole(std::string_view bytes) {
+  const std::size_t scan = bytes.rfind(kJpegScan), end = bytes.rfind(kJpegEnd);
+  return scan != std::string_view::npos && end != std::string_view::npos && end > scan;
+}
+
+// BITMAPFILEHEADER: offset of the pixels at byte 10; BITMAPINFOHEADER: width at 18, height at 22
+// (negative: top row first), bits a pixel at 28, compression at 30.
+bool bmp_is_whole(std::string_view bytes) {
+  constexpr std::size_t kHeaders = 54;
+  if (bytes.size() < kHeaders) return false;
+  const std::uint64_t offset = little_endian(bytes, 10), width = little_endian(bytes, 18);
+  const auto signed_height = static_cast<std::int32_t>(little_endian(bytes, 22));
+  const std::uint64_t height = signed_height < 0 ? -static_cast<std::int64_t>(signed_height)
+                                                 : static_cast<std::int64_t>(signed_height);
+  const std::uint64_t bits = byte_at(bytes, 28) | byte_at(bytes, 29) << 8;
+  if (little_endian(bytes, 30) != 0) return little_endian(bytes, 2) <= bytes.size();  // run lengths
+  const std::uint64_t row = (width * bits + 31) / 32 * 4;
+  return width > 0 && height > 0 && offset + row * height <= bytes.size();
+}
+
+}  // namespace
+
+void check_image_is_whole(const std::string& name, std::string_view bytes) {
+  bool whole = false;
+  if (bytes.starts_with(kPngSignature))
+    whole = png_is_whole(name, bytes);
+  else if (bytes.starts_with(kJpegStart))
+    whole = jpeg_is_whole(bytes);
+  else if (bytes.starts_with("BM"))
+    whole = bmp_is_whole(bytes);
+  check(whole, "{}: truncated or not an image", name);
+}
+
+}  // namespace rugae

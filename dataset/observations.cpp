@@ -1,0 +1,118 @@
+#include "dataset/observations.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "core/check.h"
+#include "dataset/frame_list.h"
+#include "dataset/image_io.h"
+
+namespace rugae {
+namespace fs = std::filesystem;
+
+// Runs of digits compare as numbers, everything else byte by byte: "f2.png" before "f10.png".
+bool natural_less(const std::string& a, const std::string& b) {
+  const auto digit = [](const std::string& s, std::size_t i) {
+    return i < s.size() && std::isdigit(static_cast<unsigned char>(s[i])) != 0;
+  };
+  std::size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (digit(a, i) && digit(b, j)) {
+      while (i < a.size() && a[i] == '0') ++i;
+      while (j < b.size() && b[j] == '0') ++j;
+      std::size_t m = i, n = j;
+      while (digit(a, m)) ++m;
+      while (digit(b, n)) ++n;
+      if (m - i != n - j) return m - i < n - j;
+      const int order = a.compare(i, m - i, b, j, n - j);
+      if (order != 0) return order < 0;
+      i = m;
+      j = n;
+    } else {
+      if (a[i] != b[j]) return static_cast<unsigned char>(a[i]) < static_cast<unsigned char>(b[j]);
+      ++i;
+      ++j;
+    }
+  }
+  if (i < a.size() || j < b.size()) return j < b.size();
+  return a < b;  // "f01" and "f1" differ only in zeros
+}
+
+namespace {
+
+struct Source {
+  std::vector<fs::path> files;
+  std::vector<double> times_s;
+  fs::path calibration;
+};
+
+// The folder's parts by the layout of a dataset; truth is neither looked for nor named here.
+Source of_dataset(const fs::path& folder, const fs::path& observations) {
+  Source source;
+  const fs::path list = observations / "frames.csv";
+  check(fs::exists(list), "{}: the dataset was not finished (no {}); run the simulation again",
+        folder.string(), fs::relative(list, folder).string());
+  for (const FrameRecord& record : read_frame_list(list)) {
+    source.files.push_back(observations / "frames" / fmt::format("{:06}.png", source.files.size()));
+    check(fs::exists(source.files.back()), "{}: missing", source.files.back().string());
+    source.times_s.push_back(record.time_s);
+  }
+  source.calibration = observations / "calibration.yaml";
+  return source;
+}
+
+Source of_images(const fs::path& folder, double fps) {
+  Source source;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_regular_file() && has_image_extension(entry.path()))
+      source.files.push_back(entry.path());
+  check(!source.files.empty(), "{}: no images (PNG, JPEG or BMP) in this folder", folder.string());
+  std::ranges::sort(source.files, [](const fs::path& a, const fs::path& b) {
+    return natural_less(a.filename().string(), b.filename().string());
+  });
+  check(fps > 0.0, "fps is {}, expected above 0", fps);
+  for (std::size_t i = 0; i < source.files.size(); ++i)
+    source.times_s.push_back(static_cast<double>(i) / fps);
+  source.calibration = folder / "calibration.yaml";
+  return source;
+}
+
+}  // namespace
+
+Observations Observations::open(const fs::path& folder, const fs::path& calibration, double fps) {
+  check(fs::exists(folder), "{}: no such folder", folder.string());
+  check(fs::is_directory(folder), "{}: is a file, expected a folder", folder.string());
+  Source source;
+  if (fs::is_directory(folder / "observations"))
+    source = of_dataset(folder, folder / "observations");
+  else if (fs::is_directory(folder / "frames"))
+    source = of_dataset(folder, folder);
+  else
+    source = of_images(folder, fps);
+  check(source.files.size() >= 2, "{}: {} usable frame{}, at least two are needed", folder.string(),
+        source.files.size(), source.files.size() == 1 ? "" : "s");
+  if (!calibration.empty()) source.calibration = calibration;
+  check(!calibration.empty() || fs::exists(source.calibration),
+        "{}: no calibration for these images; give one with --calibration", folder.string());
+
+  Observations observations;
+  observations.lens_ = load_lens(source.calibration);
+  observations.files_ = std::move(source.files);
+  observations.times_s_ = std::move(source.times_s);
+  const fs::path absolute = fs::absolute(folder).lexically_normal();
+  observations.name_ =
+      (absolute.has_filename() ? absolute : absolute.parent_path()).filename().string();
+  (void)observations.image(0);  // its size against the lens, before work begins
+  return observations;
+}
+
+cv::Mat Observations::image(int index) const {
+  cv::Mat image = read_image_bgr(files_.at(static_cast<std::size_t>(index)));
+  check(image.cols == lens_.width && image.rows == lens_.height,
+        "{}: image of {} x {} px, the calibration is for {} x {}",
+        files_[static_cast<std::size_t>(index)].string(), image.cols, image.rows, lens_.width,
+        lens_.height);
+  return image;
+}
+
+}  // namespace rugae

@@ -1,0 +1,194 @@
+#include "dataset/writer.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "core/files.h"
+#include "core/mesh_io.h"
+#include "dataset/camera_yaml.h"
+#include "dataset/frame_list.h"
+#include "dataset/image_io.h"
+#include "dataset/manifest.h"
+
+namespace rugae {
+namespace fs = std::filesystem;
+using nlohmann::json;
+namespace {
+
+constexpr int kLayoutVersion = 1;  // raised when readers of the layout must change
+
+json as_json(const DatasetInfo& info) {
+  json options = json::object();
+  if (!info.text.empty()) {
+    options = json::parse(info.text, nullptr, false);
+    check(options.is_object(), "the options of a dataset are not a JSON object: {}", info.text);
+  }
+  return {{"layout_version", kLayoutVersion},
+          {"scene", info.scene},
+          {"camera", info.camera},
+          {"trajectory", info.trajectory},
+          {"resolution", info.resolution},
+          {"seed", info.seed},
+          {"frames", info.frames},
+          {"labels", info.labels},
+          {"options", options},
+          {"units", {{"length", "mm"}, {"time", "s"}, {"flow", "px"}}},
+          {"axes",
+           {{"camera", "x right, y down, z forward"},
+            {"pixel", "the centre of the first pixel is (0.5, 0.5)"},
+            {"pose", "world_from_camera"}}}};
+}
+
+std::string shown(const json& object, const std::string& key) {
+  return object.contains(key) ? object[key].dump() : "absent";
+}
+
+// The first thing in which two infos differ, as "seed is 1, now 2".
+std::string difference(const json& found, const json& now) {
+  for (const auto& object : {now, found})
+    for (const auto& [key, value] : object.items()) {
+      if (shown(found, key) == shown(now, key)) continue;
+      if (value.is_object() && found.contains(key) && now.contains(key))
+        return key + ": " + difference(found[key], now[key]);
+      return fmt::format("{} is {}, now {}", key, shown(found, key), shown(now, key));
+    }
+  return "written differently";
+}
+
+json read_json(const fs::path& file) {
+  json object = json::parse(read_text(file), nullptr, false);
+  check(object.is_object(), "{}: not a JSON object", file.string());
+  return object;
+}
+
+// Only an empty folder may become a dataset: nothing of the user's is to end up in its manifest.
+void check_empty(const fs::path& root) {
+  for (const auto& entry : fs::directory_iterator(root))
+    check(is_temporary(entry.path()),
+          "{}: is neither empty nor a dataset (it holds '{}'); choose another folder",
+          root.string(), entry.path().filename().string());
+}
+
+void remove_temporaries(const fs::path& root) {
+  for (const std::string& file : files_below(root, ""))
+    if (is_temporary(file)) fs::remove(root / file);
+}
+
+void check_label(const cv::Mat& label, int type, const cv::Mat& frame, const char* name,
+                 int index) {
+  check(label.type() == type && label.size() == frame.size(),
+        "frame {}: {} is {} x {} of {}, expected {} x {} of {}", index, name, label.cols,
+        label.rows, cv::typeToString(label.type()), frame.cols, frame.rows, cv::typeToString(type));
+}
+
+}  // namespace
+
+std::string info_json(const DatasetInfo& info) { return as_json(info).dump(2) + "\n"; }
+
+DatasetInfo read_info(const fs::path& file) {
+  const json object = read_json(file);
+  DatasetInfo info;
+  try {
+    const int version = object.at("layout_version").get<int>();
+    check(version == kLayoutVersion, "{}: layout version {}, this program reads {}", file.string(),
+          version, kLayoutVersion);
+    object.at("scene").get_to(info.scene);
+    object.at("camera").get_to(info.camera);
+    object.at("trajectory").get_to(info.trajectory);
+    object.at("resolution").get_to(info.resolution);
+    object.at("seed").get_to(info.seed);
+    object.at("frames").get_to(info.frames);
+    object.at("labels").get_to(info.labels);
+    info.text = object.at("options").dump();
+  } catch (const json::exception& error) {
+    fail("{}: not the description of a dataset: {}", file.string(), error.what());
+  }
+  return info;
+}
+
+DatasetWriter::DatasetWriter(const fs::path& root, const DatasetInfo& info) : info_(info) {
+  layout_.root = root;
+  check(info.frames >= 1, "{}: a dataset of {} frames, expected at least 1", root.string(),
+        info.frames);
+  const std::string text = info_json(info);
+  make_folder(root);
+  if (fs::exists(layout_.info())) {
+    if (read_text(layout_.info()) != text)
+      fail("{}: holds another dataset ({}); choose another folder or remove it", root.string(),
+           difference(read_json(layout_.info()), json::parse(text)));
+    remove_temporaries(root);
+  } else {
+    check_empty(root);
+    write_atomic(layout_.info(), text);
+  }
+  make_folder(layout_.frames());
+  make_folder(layout_.truth());
+  if (info.labels)
+    for (const fs::path& file :
+         {layout_.depth(0), layout_.normals(0), layout_.flow(0), layout_.masks(0)})
+      make_folder(file.parent_path());
+}
+
+void DatasetWriter::write_scene(const Camera& camera, const PoseTrack& track,
+                                const TriangleMesh& wall) {
+  check(static_cast<int>(track.size()) == info_.frames, "{}: a path of {} poses for {} frames",
+        layout_.root.string(), track.size(), info_.frames);
+  const auto write_same = [](const fs::path& file, const std::string& text) {
+    check(!fs::exists(file) || read_text(file) == text,
+          "{}: differs from this run's; choose another folder or remove it", file.string());
+    write_atomic(file, text);
+  };
+  write_same(layout_.camera(), camera_yaml(camera));
+  write_same(layout_.trajectory(), tum_text(track));
+  write_same(layout_.calibration(), lens_yaml(camera.lens, "calibration of " + camera.name));
+  write_ply(layout_.wall(), wall, true);
+  track_ = track;
+  width_ = camera.lens.width;
+  height_ = camera.lens.height;
+}
+
+bool DatasetWriter::has_frame(int index) const {
+  if (!fs::exists(layout_.frame(index))) return false;
+  if (!info_.labels) return true;
+  return fs::exists(layout_.depth(index)) && fs::exists(layout_.normals(index)) &&
+         fs::exists(layout_.masks(index)) && (!has_flow(index) || fs::exists(layout_.flow(index)));
+}
+
+void DatasetWriter::write_frame(int index, const cv::Mat& bgr8, const FrameTruth& truth) const {
+  check(index >= 0 && index < info_.frames, "frame {}: the dataset has {} frames", index,
+        info_.frames);
+  check(bgr8.type() == CV_8UC3 && (width_ == 0 || (bgr8.cols == width_ && bgr8.rows == height_)),
+        "frame {}: image is {} x {} of {}, expected {} x {} of CV_8UC3", index, bgr8.cols,
+        bgr8.rows, cv::typeToString(bgr8.type()), width_, height_);
+  if (info_.labels) {
+    check_label(truth.depth_mm, CV_32FC1, bgr8, "depth", index);
+    check_label(truth.normal, CV_32FC3, bgr8, "normal", index);
+    check_label(truth.masks, CV_8UC1, bgr8, "masks", index);
+    if (has_flow(index)) check_label(truth.flow_px, CV_32FC2, bgr8, "flow", index);
+    write_exr(layout_.depth(index), truth.depth_mm);
+    write_normals(layout_.normals(index), truth.normal);
+    write_image(layout_.masks(index), truth.masks);
+    if (has_flow(index)) write_exr(layout_.flow(index), truth.flow_px);
+  }
+  write_image(layout_.frame(index), bgr8);
+}
+
+void DatasetWriter::finish(const std::vector<double>& exposure_s,
+                           const std::vector<double>& gain) const {
+  const auto frames = static_cast<std::size_t>(info_.frames);
+  check(track_.size() == frames, "{}: the scene was not written", layout_.root.string());
+  check(exposure_s.size() == frames && gain.size() == frames,
+        "{}: {} exposures and {} gains for {} frames", layout_.root.string(), exposure_s.size(),
+        gain.size(), frames);
+  std::vector<FrameRecord> records;
+  for (std::size_t i = 0; i < frames; ++i) {
+    check(has_frame(static_cast<int>(i)), "{}: frame {} was not written", layout_.root.string(), i);
+    records.push_back({track_[i].time_s, exposure_s[i], gain[i]});
+  }
+  write_atomic(layout_.frame_list(), frame_list_text(records));
+  remove_temporaries(layout_.root);
+  const auto files = files_below(layout_.root, layout_.manifest().filename().string());
+  write_atomic(layout_.manifest(), manifest_text(files, hashes_of(layout_.root, files)));
+}
+
+}  // namespace rugae
