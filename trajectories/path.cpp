@@ -1,0 +1,126 @@
+#include "trajectories/path.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/check.h"
+
+namespace rugae {
+namespace {
+
+constexpr double kCheckStepMm = 0.25;
+
+/// Slopes of the monotone cubic through (x_k, k): Fritsch and Carlson, SIAM J. Numer. Anal. 1980,
+/// doi:10.1137/0717021, with the harmonic means of Fritsch and Butland 1984, doi:10.1137/0905021.
+std::vector<double> monotone_slopes(const std::vector<double>& x) {
+  const std::size_t n = x.size();
+  std::vector<double> slope(n);
+  for (std::size_t k = 1; k + 1 < n; ++k) {
+    const double h0 = x[k] - x[k - 1], h1 = x[k + 1] - x[k];
+    // 3 (h0 + h1) / ((2 h1 + h0) / d0 + (h1 + 2 h0) / d1) with d = 1 / h.
+    slope[k] = 3.0 * (h0 + h1) / ((2.0 * h1 + h0) * h0 + (h1 + 2.0 * h0) * h1);
+  }
+  slope.front() = 1.0 / (x[1] - x[0]);
+  slope.back() = 1.0 / (x[n - 1] - x[n - 2]);
+  return slope;
+}
+
+}  // namespace
+
+Rigid3 PlannedPath::world_from_camera(double fraction) const {
+  const double u = impl_->parameter_at(std::clamp(fraction, 0.0, 1.0));
+  return {spline_rotation(impl_->rotations, u), spline_value(impl_->positions, u)};
+}
+
+double PlannedPath::length_mm() const { return impl_->length_mm; }
+double PlannedPath::min_clearance_mm() const { return impl_->min_clearance_mm; }
+
+PoseTrack sample_path(const PlannedPath& path, int frames, double fps) {
+  check(frames >= 2, "a path is sampled at {} frames, expected at least 2", frames);
+  check(fps > 0.0 && std::isfinite(fps),
+        "a path is sampled at {} frames a second, expected more "
+        "than 0",
+        fps);
+  PoseTrack track(frames);
+  for (int i = 0; i < frames; ++i) track[i] = {i / fps, path.world_from_camera(i / (frames - 1.0))};
+  return track;
+}
+
+std::string place_text(const Vec3& p) {
+  return fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", p.x(), p.y(), p.z());
+}
+
+Clearance least_clearance(const FreeSpace& space, const std::vector<Vec3>& positions,
+                          const ArcLength& arc) {
+  const int steps = static_cast<int>(std::ceil(arc.total() / kCheckStepMm));
+  std::vector<double> depth(steps + 1);
+  const auto point = [&](int i) {
+    return spline_value(positions, arc.parameter(arc.total() * i / std::max(steps, 1)));
+  };
+  tbb::parallel_for(0, steps + 1, [&](int i) { depth[i] = space.depth_mm(point(i)); });
+  const int least = static_cast<int>(std::ranges::min_element(depth) - depth.begin());
+  return {depth[least], arc.total() * least / std::max(steps, 1), point(least)};
+}
+
+void require_clearance(const Clearance& found, double clearance_mm, const std::string& name) {
+  check(found.least_mm >= clearance_mm,
+        "trajectory '{}' would leave the stomach: {:.1f} mm along its way, near {}, its distance "
+        "to the wall is {:.2f} mm{}, expected at least {} mm",
+        name, found.along_mm, place_text(found.place), found.least_mm,
+        found.least_mm < 0.0 ? " (outside)" : "", clearance_mm);
+}
+
+PlannedPath::Impl follow_track(const PoseTrack& track, const std::string& name) {
+  check(track.size() >= 2, "{}: {} poses, expected at least 2", name, track.size());
+  std::vector<Vec3> points;
+  std::vector<Quat> rotations;
+  std::vector<double> times;
+  for (const TimedPose& pose : track) {
+    points.push_back(pose.world_from_camera.translation);
+    rotations.push_back(pose.world_from_camera.rotation.normalized());
+    times.push_back(pose.time_s);
+  }
+  PlannedPath::Impl impl;
+  impl.positions = interpolating_controls(points);
+  impl.rotations = interpolating_controls(rotations);
+  impl.length_mm = ArcLength(impl.positions).total();
+  impl.parameter_at = [times, slopes = monotone_slopes(times)](double fraction) {
+    const double time = times.front() + fraction * (times.back() - times.front());
+    const auto next = std::upper_bound(times.begin() + 1, times.end() - 1, time);
+    const auto k = static_cast<std::size_t>(next - times.begin()) - 1;
+    const double h = times[k + 1] - times[k], t = std::clamp((time - times[k]) / h, 0.0, 1.0);
+    // Cubic Hermite from k to k + 1.
+    const double t2 = t * t, t3 = t2 * t;
+    return double(k) + h * slopes[k] * (t3 - 2.0 * t2 + t) + (3.0 * t2 - 2.0 * t3) +
+           h * slopes[k + 1] * (t3 - t2);
+  };
+  return impl;
+}
+
+void check_inside(const TriangleMesh& wall, const PoseTrack& track, double clearance_mm,
+                  const std::string& name) {
+  const ClosestPoint closest(wall);
+  const auto require = [&](const Vec3& p, std::size_t pose, const char* where) {
+    check(p.allFinite(), "{}: pose {} is not finite", name, pose);
+    const double depth = -closest.signed_distance_mm(p);
+    check(depth >= clearance_mm,
+          "{}: {} pose {}, at {}, the camera {} {:.2f} mm from the wall, expected at least {} mm "
+          "inside",
+          name, where, pose, place_text(p), depth < 0.0 ? "is outside," : "is only",
+          std::abs(depth), clearance_mm);
+  };
+  for (std::size_t i = 0; i < track.size(); ++i) {
+    const Vec3& here = track[i].world_from_camera.translation;
+    require(here, i, "at");
+    if (i + 1 == track.size()) break;
+    const Vec3& there = track[i + 1].world_from_camera.translation;
+    if (!there.allFinite()) continue;
+    const int steps = static_cast<int>(std::ceil((there - here).norm() / kCheckStepMm));
+    for (int k = 1; k < steps; ++k)
+      require(here + (there - here) * (double(k) / steps), i, "after");
+  }
+}
+
+}  // namespace rugae
