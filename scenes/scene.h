@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,32 +39,37 @@ struct MucosaSample {
 };
 
 struct MucosaOptions {
-  Vec3 base_albedo{0.62, 0.28, 0.20};  // replaced by the preset
-  double vessel_contrast = 0.25;
-  double mottle_contrast = 0.2;
-  double wetness = 0.6;
+  Vec3 base_albedo{0.62, 0.28, 0.20};  // linear RGB; replaced by the preset
+  double vessel_contrast = 0.25;       // 0 to 1: how dark vessels are
+  double mottle_contrast = 0.2;        // 0 to 1: blotches, areae and foveolae
+  double wetness = 0.6;                // 0 to 1: share of the wall under the wet layer
   double oil = 0.0;  // 0 to 1: coverage and smoothness of an oil film (trajectory 6)
   void check(const std::string& where) const;
 };
 
 /// The mucosa as a pure function of the rest position, so that no UV map is needed and deformation
-/// carries it along.
+/// carries it along. Copies share their noise tiles; sampling is safe from many threads at once.
 class Mucosa {
  public:
   Mucosa(const MucosaOptions& options, std::uint64_t seed);
-  /// `footprint_mm` is the width of a pixel on the wall: detail finer than twice that is faded out.
+  /// `normal` is the wall's unit normal at rest, of either side. `footprint_mm` is the width of a
+  /// pixel on the wall: detail finer than twice that is faded out, and the slopes that faded go
+  /// into the roughness.
   MucosaSample sample(const Vec3f& rest_position_mm, const Vec3f& normal, Region region,
                       float footprint_mm) const;
 
  private:
+  struct Tiles;
   MucosaOptions options_;
-  std::uint64_t seed_;
+  Vec3f base_albedo_;
+  std::shared_ptr<const Tiles> tiles_;
 };
 
 struct Scene {
   std::string name;
   TriangleMesh wall;                 // with vertex normals
-  std::vector<Vec3> rest_positions;  // of the vertices; what the mucosa is a function of
+  std::vector<Vec3> rest_positions;  // of the vertices: where they are, relief and all, before any
+                                     // deformation; what the mucosa is a function of
   std::vector<Region> regions;       // of the vertices
   Mucosa mucosa;
   std::uint64_t seed = 1;

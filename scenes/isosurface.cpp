@@ -1,0 +1,196 @@
+#include "scenes/isosurface.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <unordered_map>
+
+#include "core/check.h"
+
+namespace rugae {
+namespace {
+
+constexpr int kBlock = 8;  // cells along a block's edge
+constexpr int kCorners = kBlock + 1;
+
+struct CellVertex {
+  std::int64_t cell;
+  Vec3 position;
+};
+struct GridEdge {
+  std::int64_t cell;  // the edge starts at the cell's lowest corner
+  int axis;
+  bool leaves;  // from inside to outside along the axis
+};
+struct BlockSurface {
+  std::vector<CellVertex> vertices;
+  std::vector<GridEdge> edges;
+};
+
+struct Grid {
+  Vec3 origin;
+  double cell_mm;
+  Vec3i blocks;
+
+  std::int64_t key(int x, int y, int z) const {
+    const std::int64_t nx = blocks.x() * kBlock + 2, ny = blocks.y() * kBlock + 2;
+    return x + 1 + nx * (y + 1 + ny * (z + 1));
+  }
+  std::int64_t stride(int axis) const {
+    const std::int64_t nx = blocks.x() * kBlock + 2, ny = blocks.y() * kBlock + 2;
+    return axis == 0 ? 1 : axis == 1 ? nx : nx * ny;
+  }
+  Vec3 corner(int x, int y, int z) const { return origin + cell_mm * Vec3(x, y, z); }
+};
+
+BlockSurface surface_in_block(const DistanceField& field, const Grid& grid, const Vec3i& first) {
+  BlockSurface out;
+  Vec3 gradient;
+  const double half = 0.5 * kBlock * grid.cell_mm;
+  const double reach = kSteepestField * std::sqrt(3.0) * half;
+  const Vec3 centre = grid.corner(first.x(), first.y(), first.z()) + Vec3::Constant(half);
+  if (std::abs(field(centre, gradient)) > reach) return out;
+
+  std::array<double, kCorners * kCorners * kCorners> value;
+  const auto at = [&](int x, int y, int z) -> double& {
+    return value[x + kCorners * (y + kCorners * z)];
+  };
+  for (int z = 0; z < kCorners; ++z)
+    for (int y = 0; y < kCorners; ++y)
+      for (int x = 0; x < kCorners; ++x)
+        at(x, y, z) = field(grid.corner(first.x() + x, first.y() + y, first.z() + z), gradient);
+
+  for (int z = 0; z < kBlock; ++z)
+    for (int y = 0; y < kBlock; ++y)
+      for (int x = 0; x < kBlock; ++x) {
+        const std::int64_t cell = grid.key(first.x() + x, first.y() + y, first.z() + z);
+        // the vertex: the mean of the level's crossings with the cell's twelve edges
+        Vec3 sum = Vec3::Zero();
+        int crossings = 0;
+        for (int axis = 0; axis < 3; ++axis)
+          for (int side = 0; side < 4; ++side) {
+            Vec3i a(x, y, z);
+            a[(axis + 1) % 3] += side & 1;
+            a[(axis + 2) % 3] += side >> 1;
+            Vec3i b = a;
+            ++b[axis];
+            const double va = at(a.x(), a.y(), a.z()), vb = at(b.x(), b.y(), b.z());
+            if ((va < 0.0) == (vb < 0.0)) continue;
+            if (side == 0) out.edges.push_back({cell, axis, va < 0.0});
+            Vec3 p = (first + a).cast<double>();
+            p[axis] += va / (va - vb);
+            sum += p;
+            ++crossings;
+          }
+        if (crossings)
+          out.vertices.push_back({cell, grid.origin + grid.cell_mm * (sum / crossings)});
+      }
+  return out;
+}
+
+double least_angle_cos(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const auto cosine = [](const Vec3& u, const Vec3& v) {
+    return u.dot(v) / std::sqrt(u.squaredNorm() * v.squaredNorm() + 1e-30);
+  };
+  return std::max({cosine(b - a, c - a), cosine(a - b, c - b), cosine(a - c, b - c)});
+}
+
+void relax(TriangleMesh& mesh, const std::vector<std::array<int, 4>>& quads,
+           const DistanceField& field, int rounds) {
+  const std::size_t count = mesh.vertices.size();
+  std::vector<int> degree(count, 0);
+  for (const auto& q : quads)
+    for (int v : q) ++degree[v];
+  std::vector<Vec3> mean(count);
+  for (int round = 0; round <= rounds; ++round) {
+    if (round > 0) {
+      std::fill(mean.begin(), mean.end(), Vec3::Zero());
+      for (const auto& q : quads)
+        for (int k = 0; k < 4; ++k)  // every edge is met from both of its quads
+          mean[q[k]] += 0.5 * (mesh.vertices[q[(k + 1) % 4]] + mesh.vertices[q[(k + 3) % 4]]);
+    }
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t v) {
+      Vec3 p =
+          round > 0 ? Vec3(0.5 * mesh.vertices[v] + 0.5 * mean[v] / degree[v]) : mesh.vertices[v];
+      Vec3 gradient;
+      const int newton_steps = round == rounds ? 3 : 1;
+      for (int step = 0; step < newton_steps; ++step) {
+        const double distance = field(p, gradient);
+        p -= (distance / std::max(gradient.squaredNorm(), 1e-4)) * gradient;
+      }
+      mesh.vertices[v] = p;
+    });
+  }
+}
+
+}  // namespace
+
+TriangleMesh isosurface(const DistanceField& field, const Eigen::AlignedBox3d& box, double cell_mm,
+                        int rounds, const std::string& name) {
+  Grid grid{box.min() - Vec3::Constant(cell_mm), cell_mm, {}};
+  for (int a = 0; a < 3; ++a)
+    grid.blocks[a] =
+        static_cast<int>(std::ceil((box.sizes()[a] + 2.0 * cell_mm) / (kBlock * cell_mm)));
+  const std::size_t count =
+      static_cast<std::size_t>(grid.blocks.x()) * grid.blocks.y() * grid.blocks.z();
+  check(count < (std::size_t{1} << 27), "{}: {} mm is too fine for a wall of {:.0f} mm", name,
+        cell_mm, box.sizes().maxCoeff());
+  std::vector<BlockSurface> surfaces(count);
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    const int nx = grid.blocks.x(), ny = grid.blocks.y();
+    const Vec3i block(static_cast<int>(i % nx), static_cast<int>(i / nx % ny),
+                      static_cast<int>(i / nx / ny));
+    surfaces[i] = surface_in_block(field, grid, kBlock * block);
+  });
+
+  TriangleMesh mesh;
+  std::unordered_map<std::int64_t, int> vertex_of_cell;
+  std::size_t total = 0;
+  for (const auto& s : surfaces) total += s.vertices.size();
+  vertex_of_cell.reserve(total);
+  mesh.vertices.reserve(total);
+  for (const auto& s : surfaces)
+    for (const CellVertex& v : s.vertices) {
+      vertex_of_cell.emplace(v.cell, static_cast<int>(mesh.vertices.size()));
+      mesh.vertices.push_back(v.position);
+    }
+  std::vector<std::array<int, 4>> quads;
+  quads.reserve(total);
+  for (const auto& s : surfaces)
+    for (const GridEdge& e : s.edges) {
+      const std::int64_t u = grid.stride((e.axis + 1) % 3), w = grid.stride((e.axis + 2) % 3);
+      // the four cells around the edge, turning from u to w: the normal is along the axis
+      std::array<std::int64_t, 4> cells{e.cell, e.cell - u, e.cell - u - w, e.cell - w};
+      std::array<int, 4> quad;
+      for (int k = 0; k < 4; ++k) {
+        const auto found = vertex_of_cell.find(cells[k]);
+        check(found != vertex_of_cell.end(), "{}: the wall reaches the border of its box", name);
+        quad[k] = found->second;
+      }
+      if (!e.leaves) std::swap(quad[1], quad[3]);
+      quads.push_back(quad);
+    }
+  check(!quads.empty(), "{}: no wall found at a cell of {} mm", name, cell_mm);
+  relax(mesh, quads, field, rounds);
+
+  mesh.triangles.reserve(2 * quads.size());
+  for (const auto& q : quads) {
+    const auto& v = mesh.vertices;
+    const double cut02 = std::max(least_angle_cos(v[q[0]], v[q[1]], v[q[2]]),
+                                  least_angle_cos(v[q[0]], v[q[2]], v[q[3]]));
+    const double cut13 = std::max(least_angle_cos(v[q[0]], v[q[1]], v[q[3]]),
+                                  least_angle_cos(v[q[1]], v[q[2]], v[q[3]]));
+    if (cut02 <= cut13) {
+      mesh.triangles.emplace_back(q[0], q[1], q[2]);
+      mesh.triangles.emplace_back(q[0], q[2], q[3]);
+    } else {
+      mesh.triangles.emplace_back(q[0], q[1], q[3]);
+      mesh.triangles.emplace_back(q[1], q[2], q[3]);
+    }
+  }
+  return mesh;
+}
+
+}  // namespace rugae

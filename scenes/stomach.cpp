@@ -1,0 +1,148 @@
+#include "scenes/stomach.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/check.h"
+#include "scenes/isosurface.h"
+#include "scenes/portable_math.h"
+
+namespace rugae {
+namespace {
+
+// The J-shaped axis with its calibre, mm. Lengths and widths assumed within the ranges of
+// textbooks: greatest width in the fundus and upper body, about 10 cm; antrum 5 to 6 cm; pyloric
+// canal 1.5 cm.
+struct Station {
+  double x, y, z, radius;
+};
+constexpr Station kAxis[] = {
+    {34, 10, 40, 43},      // 0 centre of the fundus' dome
+    {38, 9, 22, 47.5},     // 1
+    {37, 6, 0, 49},        // 2 level of the cardia
+    {33, 3, -24, 48},      // 3
+    {26, 0, -48, 45},      // 4 body
+    {14, -4, -70, 41},     // 5
+    {-6, -8, -87, 35},     // 6 below the incisura
+    {-29, -11, -94, 29},   // 7 antrum
+    {-51, -11, -90, 24},   // 8
+    {-67, -9, -78, 17.5},  // 9
+    {-79, -6, -66, 8.5},   // 10 pyloric canal
+    {-86, -4, -57, 7},     // 11
+    {-92, -2, -49, 9},     // 12 first centimetres of the duodenum, a blind stub
+    {-97, 0, -41, 10},     // 13
+};
+constexpr Station kOesophagus[] = {
+    {4, 6, 14, 10}, {-12, 6, 30, 9.5}, {-22, 6, 43, 9}, {-29, 6, 56, 9}};
+constexpr std::size_t kCardiaNode = 2, kBodyNode = 4, kIncisuraNode = 6, kAntrumNode = 7,
+                      kPylorusNode = 10, kDuodenumNode = 12;
+constexpr double kFlattening = 0.92;  // front to back, of a distended stomach; assumed
+
+std::vector<AxisNode> scaled(const Station* begin, const Station* end, double scale) {
+  std::vector<AxisNode> nodes;
+  for (const Station* s = begin; s != end; ++s)
+    nodes.push_back({scale * Vec3(s->x, s->y, s->z), scale * s->radius});
+  return nodes;
+}
+
+}  // namespace
+
+std::string region_name(Region region) {
+  switch (region) {
+    case Region::unknown:
+      return "unknown";
+    case Region::cardia:
+      return "cardia";
+    case Region::fundus:
+      return "fundus";
+    case Region::body:
+      return "body";
+    case Region::incisura:
+      return "incisura";
+    case Region::antrum:
+      return "antrum";
+    case Region::pylorus:
+      return "pylorus";
+    case Region::oesophagus:
+      return "oesophagus";
+    case Region::duodenum:
+      return "duodenum";
+  }
+  return "unknown";
+}
+
+void StomachOptions::check(const std::string& where) const {
+  rugae::check(scale >= 0.3 && scale <= 2.0, "{}: scale is {}, expected 0.3 to 2", where, scale);
+  relief.check(where);
+}
+
+StomachShape::StomachShape(double scale)
+    : scale_(scale),
+      axis_(scaled(std::begin(kAxis), std::end(kAxis), scale), 4.0 * scale, 4.0 * scale,
+            kFlattening, Vec3::UnitY()),
+      oesophagus_(scaled(std::begin(kOesophagus), std::end(kOesophagus), scale), 3.0 * scale,
+                  2.0 * scale, 1.0, Vec3::UnitY()) {}
+
+double StomachShape::distance_mm(const Vec3& p, Vec3& gradient) const {
+  Vec3 g0, g1;
+  const double d0 = axis_.distance_mm(p, g0), d1 = oesophagus_.distance_mm(p, g1);
+  // smooth minimum of the two: -k ln(exp(-d0/k) + exp(-d1/k))
+  const double k = 3.0 * scale_, least = std::min(d0, d1);
+  const double w0 = portable_exp((least - d0) / k), w1 = portable_exp((least - d1) / k);
+  gradient = (w0 * g0 + w1 * g1) / (w0 + w1);
+  return least - k * portable_log(w0 + w1);
+}
+
+Region StomachShape::region(const Vec3& p, const AxisPoint& at) const {
+  Vec3 gradient;
+  const double stub = oesophagus_.distance_mm(p, gradient);
+  if (stub < at.distance_mm - 4.0 * scale_) return Region::oesophagus;
+  if (stub < 15.0 * scale_ && at.s_mm < axis_.node_s_mm(kBodyNode)) return Region::cardia;
+  if (at.s_mm > axis_.node_s_mm(kDuodenumNode)) return Region::duodenum;
+  if (at.s_mm > axis_.node_s_mm(kPylorusNode)) return Region::pylorus;
+  // the fundus is the dome above the level of the cardia
+  if (at.s_mm < axis_.node_s_mm(kCardiaNode)) return Region::fundus;
+  const double off_incisura = std::abs(at.s_mm - axis_.node_s_mm(kIncisuraNode));
+  if (at.cos_greater < -0.6 && off_incisura < 14.0 * scale_) return Region::incisura;
+  return at.s_mm < axis_.node_s_mm(kIncisuraNode) ? Region::body : Region::antrum;
+}
+
+FoldZone StomachShape::fold_zone() const {
+  FoldZone zone;
+  zone.rise_from_mm = axis_.node_s_mm(1);
+  zone.rise_to_mm = axis_.node_s_mm(3);
+  zone.fall_from_mm = axis_.node_s_mm(5);
+  zone.fall_to_mm = axis_.node_s_mm(kAntrumNode + 1);
+  return zone;
+}
+
+Eigen::AlignedBox3d StomachShape::box() const { return axis_.box().merged(oesophagus_.box()); }
+
+double StomachShape::length_mm() const {
+  return scale_ * kAxis[0].radius + axis_.node_s_mm(kPylorusNode + 1);
+}
+
+StomachWall make_stomach(const StomachOptions& options, std::uint64_t seed, double cell_mm) {
+  const StomachShape shape(options.scale);
+  const Relief relief(options.relief, shape.fold_zone(), seed);
+  constexpr int kRelaxRounds = 6;
+  StomachWall wall;
+  wall.mesh = isosurface([&](const Vec3& p, Vec3& g) { return shape.distance_mm(p, g); },
+                         shape.box(), cell_mm, kRelaxRounds, "stomach");
+  auto& vertices = wall.mesh.vertices;
+  wall.regions.resize(vertices.size());
+  tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t v) {
+    const Vec3 p = vertices[v];
+    Vec3 gradient;
+    shape.distance_mm(p, gradient);
+    const AxisPoint at = shape.locate(p);
+    wall.regions[v] = shape.region(p, at);
+    vertices[v] = p - relief.height_mm(p, at) * gradient.normalized();
+  });
+  wall.mesh.normals = angle_weighted_normals(wall.mesh);
+  return wall;
+}
+
+}  // namespace rugae

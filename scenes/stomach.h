@@ -1,0 +1,46 @@
+#pragma once
+// A human stomach without a patient: its smooth shape, its regions, its relief.
+
+#include <cstdint>
+#include <string>
+
+#include "scenes/relief.h"
+#include "scenes/scene.h"
+
+namespace rugae {
+
+struct StomachOptions {
+  double scale = 1.0;  // of all lengths of the smooth shape; 1: about 1.5 l
+  ReliefOptions relief;
+  void check(const std::string& where) const;
+};
+
+/// The smooth stomach. Axes: x to the patient's left, y to the back, z up; the cardia is near the
+/// origin. Lengths in mm.
+class StomachShape {
+ public:
+  explicit StomachShape(double scale);
+  double distance_mm(const Vec3& p, Vec3& gradient) const;
+  /// Coordinates along and around the main axis, fundus to duodenum.
+  AxisPoint locate(const Vec3& p) const { return axis_.locate(p); }
+  Region region(const Vec3& p, const AxisPoint& at) const;
+  FoldZone fold_zone() const;
+  Eigen::AlignedBox3d box() const;
+  /// From the top of the fundus to the pylorus along the axis.
+  double length_mm() const;
+
+ private:
+  double scale_;
+  OrganAxis axis_, oesophagus_;
+};
+
+struct StomachWall {
+  TriangleMesh mesh;  // closed, with vertex normals, outward
+  std::vector<Region> regions;
+};
+
+/// `cell_mm` sets the triangle size: about 3 area / cell^2 triangles. The same seed gives the same
+/// surface at every cell size.
+StomachWall make_stomach(const StomachOptions& options, std::uint64_t seed, double cell_mm);
+
+}  // namespace rugae
