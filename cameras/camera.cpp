@@ -137,13 +137,16 @@ Lens load_lens(const std::filesystem::path& file) {
   return read_lens(YamlReader::from_file(file), file.string());
 }
 
-std::string lens_yaml(const Lens& lens, const std::string& comment) {
-  std::string text = comment.empty() ? "" : "# " + comment + "\n";
-  text += "# pixels; the centre of the first pixel is (0.5, 0.5)\n";
-  text += fmt::format("model: {}\nwidth: {}\nheight: {}\n",
-                      kLensModels[static_cast<int>(lens.model)], lens.width, lens.height);
-  const auto number = [&text](const char* key, double value) {
-    text += fmt::format("{}: {:.17g}\n", key, value);
+namespace {
+
+// The lens' keys, each line behind `indent`, with 17 digits so that reading gives back the same
+// doubles.
+std::string lens_lines(const Lens& lens, const std::string& indent) {
+  std::string text =
+      fmt::format("{0}model: {1}\n{0}width: {2}\n{0}height: {3}\n", indent,
+                  kLensModels[static_cast<int>(lens.model)], lens.width, lens.height);
+  const auto number = [&](const char* key, double value) {
+    text += fmt::format("{}{}: {:.17g}\n", indent, key, value);
   };
   number("fx", lens.fx);
   number("fy", lens.fy);
@@ -158,6 +161,28 @@ std::string lens_yaml(const Lens& lens, const std::string& comment) {
     number("p1", lens.p1);
     number("p2", lens.p2);
   }
+  return text;
+}
+
+}  // namespace
+
+std::string lens_yaml(const Lens& lens, const std::string& comment) {
+  std::string text = comment.empty() ? "" : "# " + comment + "\n";
+  return text + "# pixels; the centre of the first pixel is (0.5, 0.5)\n" + lens_lines(lens, "");
+}
+
+std::string camera_yaml(const Camera& camera) {
+  const Vignetting& v = camera.vignetting;
+  const Sensor& s = camera.sensor;
+  std::string text = fmt::format("name: {}\nframes_in_paper: {}\ndiameter_mm: {:.17g}\nlens:\n",
+                                 camera.name, camera.frames_in_paper, camera.diameter_mm);
+  text += lens_lines(camera.lens, "  ");
+  text += fmt::format("vignetting:\n  cos4: {}\n  v1: {:.17g}\n  v2: {:.17g}\n  v3: {:.17g}\n",
+                      v.cos4, v.v1, v.v2, v.v3);
+  text += fmt::format("sensor:\n  pixel_pitch_um: {:.17g}\n  fps: {:.17g}\n  bit_depth: {}\n",
+                      s.pixel_pitch_um, s.fps, s.bit_depth);
+  text += fmt::format("  full_well_e: {:.17g}\n  read_noise_e: {:.17g}\n  shutter: {}\n",
+                      s.full_well_e, s.read_noise_e, kShutters[static_cast<int>(s.shutter)]);
   return text;
 }
 

@@ -49,7 +49,7 @@ struct Lens {
   void check(const std::string& where) const;
 };
 
-/// Lens::project for many points: what the model's limit costs is paid once.
+/// project and unproject for many points: the search for the model's limit is paid once.
 class LensProjector {
  public:
   explicit LensProjector(const Lens& lens);
@@ -96,6 +96,9 @@ struct Camera {
 
 /// A preset name or a YAML file.
 Camera load_camera(const std::string& name_or_path);
+
+/// The camera as YAML that load_camera reads back to the same values.
+std::string camera_yaml(const Camera& camera);
 
 /// Frames of trajectory 1 to 6 for this camera: the paper's total split evenly, earlier
 /// trajectories take the remainder.

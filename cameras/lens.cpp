@@ -1,7 +1,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
+#include <unsupported/Eigen/Polynomials>
+#include <vector>
 
 #include "cameras/camera.h"
 #include "core/check.h"
@@ -13,22 +16,22 @@ namespace {
 constexpr double kNewtonTolerance = 1e-12;  // in normalised coordinates or radians
 constexpr int kNewtonSteps = 50;
 
-// Largest angle in (0, limit] up to which `slope`, the derivative of the radial mapping, stays
-// positive.
-template <typename Slope>
-double monotonic_limit(const Slope& slope, double limit) {
-  constexpr int kSteps = 2000;
-  for (int i = 1; i <= kSteps; ++i) {
-    const double at = limit * i / kSteps;
-    if (slope(at) > 0.0) continue;
-    double low = limit * (i - 1) / kSteps, high = at;
-    for (int k = 0; k < 60; ++k) {
-      const double middle = 0.5 * (low + high);
-      (slope(middle) > 0.0 ? low : high) = middle;
-    }
-    return low;
-  }
-  return limit;
+// Smallest positive root of 1 + c1 s + c2 s^2 + ..., the derivative of the radial mapping over s =
+// r^2; infinity if there is none.
+double first_turning_point(std::initializer_list<double> coefficients) {
+  std::vector<double> c = {1.0};
+  c.insert(c.end(), coefficients);
+  while (c.size() > 1 && c.back() == 0.0) c.pop_back();
+  double smallest = std::numeric_limits<double>::infinity();
+  if (c.size() == 1) return smallest;
+  if (c.size() == 2) return c[1] < 0.0 ? -1.0 / c[1] : smallest;
+  const Eigen::VectorXd polynomial =
+      Eigen::Map<const Eigen::VectorXd>(c.data(), static_cast<Eigen::Index>(c.size()));
+  std::vector<double> roots;
+  Eigen::PolynomialSolver<double, Eigen::Dynamic>(polynomial).realRoots(roots, 1e-9);
+  for (double root : roots)
+    if (root > 0.0) smallest = std::min(smallest, root);
+  return smallest;
 }
 
 // Brown-Conrady: d = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + tangential(x), with
@@ -106,16 +109,10 @@ std::optional<Vec2> undistort(const Lens& lens, double max_angle_rad, const Vec2
 
 double Lens::max_angle_rad() const {
   if (model == LensModel::kannala_brandt)
-    return monotonic_limit([this](double theta) { return kannala_brandt_slope(*this, theta); },
-                           kPi);
-  // d/dr of r (1 + k1 r^2 + k2 r^4 + k3 r^6), over the angle so that the search is bounded.
+    return std::min(kPi, std::sqrt(first_turning_point({3.0 * k1, 5.0 * k2, 7.0 * k3, 9.0 * k4})));
   constexpr double kNearlyRight = 1e-3;  // rad short of 90 degrees, where r is a thousand
-  return monotonic_limit(
-      [this](double theta) {
-        const double r2 = std::tan(theta) * std::tan(theta);
-        return 1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3));
-      },
-      kPi / 2.0 - kNearlyRight);
+  const double r_limit = std::sqrt(first_turning_point({3.0 * k1, 5.0 * k2, 7.0 * k3}));
+  return std::min(kPi / 2.0 - kNearlyRight, std::atan(r_limit));
 }
 
 std::optional<Vec2> Lens::project(const Vec3& p_cam) const {
@@ -124,6 +121,24 @@ std::optional<Vec2> Lens::project(const Vec3& p_cam) const {
 
 std::optional<Vec3> Lens::unproject(const Vec2& pixel) const {
   return LensProjector(*this).unproject(pixel);
+}
+
+LensProjector::LensProjector(const Lens& lens)
+    : lens_(lens), max_angle_rad_(lens.max_angle_rad()), cos_limit_(std::cos(max_angle_rad_)) {}
+
+std::optional<Vec2> LensProjector::project(const Vec3& p) const {
+  const double norm = p.norm();
+  if (!(norm > 0.0) || !(norm < std::numeric_limits<double>::infinity())) return std::nullopt;
+  if (!(p.z() >= cos_limit_ * norm)) return std::nullopt;
+  Vec2 d;
+  if (lens_.model == LensModel::brown_conrady) {
+    d = brown_conrady(lens_, {p.x() / p.z(), p.y() / p.z()}).point;
+  } else {
+    const double r = std::hypot(p.x(), p.y());
+    if (r == 0.0) return Vec2(lens_.cx, lens_.cy);
+    d = kannala_brandt(lens_, std::atan2(r, p.z())) / r * Vec2(p.x(), p.y());
+  }
+  return Vec2(lens_.fx * d.x() + lens_.cx, lens_.fy * d.y() + lens_.cy);
 }
 
 std::optional<Vec3> LensProjector::unproject(const Vec2& pixel) const {
@@ -151,24 +166,6 @@ std::optional<Vec3> LensProjector::unproject(const Vec2& pixel) const {
   if (!(std::abs(kannala_brandt(lens_, theta) - theta_d) <= kNewtonTolerance)) return std::nullopt;
   const double s = std::sin(theta) / theta_d;
   return Vec3(s * d.x(), s * d.y(), std::cos(theta));
-}
-
-LensProjector::LensProjector(const Lens& lens)
-    : lens_(lens), max_angle_rad_(lens.max_angle_rad()), cos_limit_(std::cos(max_angle_rad_)) {}
-
-std::optional<Vec2> LensProjector::project(const Vec3& p) const {
-  const double norm = p.norm();
-  if (!(norm > 0.0) || !(norm < std::numeric_limits<double>::infinity())) return std::nullopt;
-  if (!(p.z() >= cos_limit_ * norm)) return std::nullopt;
-  Vec2 d;
-  if (lens_.model == LensModel::brown_conrady) {
-    d = brown_conrady(lens_, {p.x() / p.z(), p.y() / p.z()}).point;
-  } else {
-    const double r = std::hypot(p.x(), p.y());
-    if (r == 0.0) return Vec2(lens_.cx, lens_.cy);
-    d = kannala_brandt(lens_, std::atan2(r, p.z())) / r * Vec2(p.x(), p.y());
-  }
-  return Vec2(lens_.fx * d.x() + lens_.cx, lens_.fy * d.y() + lens_.cy);
 }
 
 Mat3 Lens::matrix() const {

@@ -3,10 +3,11 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <algorithm>
 #include <assimp/Importer.hpp>
 #include <bit>
 #include <cmath>
-#include <cstring>
+#include <map>
 
 #include "core/check.h"
 #include "core/files.h"
@@ -33,11 +34,12 @@ void append_node(const aiScene& scene, const aiNode& node, const aiMatrix4x4& pa
     const aiMesh& mesh = *scene.mMeshes[node.mMeshes[m]];
     const int base = static_cast<int>(out.vertices.size());
     for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
-      const aiVector3D p = world * mesh.mVertices[v];
-      const Vec3 vertex(p.x, p.y, p.z);
-      check(vertex.allFinite(), "{}: vertex {} is not finite ({}, {}, {})", name,
-            out.vertices.size(), p.x, p.y, p.z);
-      out.vertices.push_back(mm_per_unit * vertex);
+      const aiVector3D& stored = mesh.mVertices[v];
+      check(std::isfinite(stored.x) && std::isfinite(stored.y) && std::isfinite(stored.z),
+            "{}: vertex {} is not finite ({}, {}, {})", name, out.vertices.size(), stored.x,
+            stored.y, stored.z);
+      const aiVector3D p = world * stored;
+      out.vertices.push_back(mm_per_unit * Vec3(p.x, p.y, p.z));
     }
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       const aiFace& face = mesh.mFaces[f];
@@ -56,6 +58,31 @@ void append_node(const aiScene& scene, const aiNode& node, const aiMatrix4x4& pa
     append_node(scene, *node.mChildren[c], world, mm_per_unit, name, out);
 }
 
+// Vertices at exactly the same place become one (files split them at seams of normals and texture);
+// the first one's place in the order and colour stay. Assimp's own joining also takes what lies
+// near, and would take NaN.
+void join_vertices(TriangleMesh& mesh) {
+  const auto less = [](const Vec3& a, const Vec3& b) {
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+  };
+  std::map<Vec3, int, decltype(less)> places(less);
+  std::vector<int> joined(mesh.vertices.size());
+  int count = 0;
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    const auto [it, fresh] = places.emplace(mesh.vertices[v], count);
+    joined[v] = it->second;
+    if (!fresh) continue;
+    mesh.vertices[count] = mesh.vertices[v];
+    if (!mesh.colors.empty()) mesh.colors[count] = mesh.colors[v];
+    ++count;
+  }
+  mesh.vertices.resize(count);
+  if (!mesh.colors.empty()) mesh.colors.resize(count);
+  for (Vec3i& t : mesh.triangles) t = Vec3i(joined[t[0]], joined[t[1]], joined[t[2]]);
+  std::erase_if(mesh.triangles,
+                [](const Vec3i& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+}
+
 }  // namespace
 
 TriangleMesh read_mesh(const std::filesystem::path& file, double mm_per_unit) {
@@ -64,9 +91,7 @@ TriangleMesh read_mesh(const std::filesystem::path& file, double mm_per_unit) {
         name, mm_per_unit);
   check(std::filesystem::exists(file), "{}: no such mesh file", name);
   Assimp::Importer importer;
-  // Assimp's own repair of NaN would hide them; it is left out so that ours names the vertex.
-  const aiScene* scene = importer.ReadFile(
-      name, aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_JoinIdenticalVertices);
+  const aiScene* scene = importer.ReadFile(name, aiProcess_Triangulate | aiProcess_SortByPType);
   if (!scene) {
     const std::string reason = importer.GetErrorString();
     // What assimp says of a readable file that holds vertices but no faces.
@@ -79,6 +104,8 @@ TriangleMesh read_mesh(const std::filesystem::path& file, double mm_per_unit) {
   if (scene->mRootNode)
     append_node(*scene, *scene->mRootNode, aiMatrix4x4(), mm_per_unit, name, mesh);
   if (mesh.colors.size() != mesh.vertices.size()) mesh.colors.clear();
+  check_mesh(mesh, name);
+  join_vertices(mesh);
   check_mesh(mesh, name);
   return mesh;
 }

@@ -22,6 +22,7 @@ struct YamlReader::State {
 namespace {
 
 std::string place(const std::string& name, const YAML::Mark& mark) {
+  if (mark.is_null()) return name + ":1:1";  // an empty document
   return fmt::format("{}:{}:{}", name, mark.line + 1, mark.column + 1);
 }
 
