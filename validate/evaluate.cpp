@@ -1,0 +1,174 @@
+#include "validate/evaluate.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "dataset/image_io.h"
+#include "validate/metrics_json.h"
+#include "validate/visibility.h"
+
+namespace rugae {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+json tracking_json(const PoseErrors& poses, const Estimate& estimate) {
+  const auto keyframes = std::ranges::count(estimate.states, FrameState::keyframe);
+  return {{"frames", poses.frames},
+          {"tracked", poses.tracked},
+          {"lost", poses.frames - poses.tracked},
+          {"tracked_share", poses.tracked_share},
+          {"keyframes", keyframes}};
+}
+
+json time_json(const Estimate& estimate) {
+  json stages = json::array();
+  double seconds = 0.0, peak_mb = 0.0;
+  for (const StageTime& stage : estimate.stages) {
+    stages.push_back(
+        {{"name", stage.name}, {"seconds", stage.seconds}, {"peak_rss_mb", stage.peak_rss_mb}});
+    seconds += stage.seconds;
+    peak_mb = std::max(peak_mb, stage.peak_rss_mb);
+  }
+  const auto frames = static_cast<double>(estimate.states.size());
+  return {{"reconstruct_s", seconds},
+          {"frames_per_s", seconds > 0.0 ? json(frames / seconds) : json()},
+          {"peak_rss_mb", peak_mb},
+          {"stages", stages}};
+}
+
+json numbers(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+// For plots: a value a frame, null where the frame was lost.
+json frames_json(const Truth& truth, const Estimate& estimate, const PoseErrors& poses) {
+  json time_s = json::array(), position = json::array(), rotation = json::array(),
+       true_mm = json::array(), aligned_mm = json::array(), state = json::array();
+  std::size_t next = 0;  // of the tracked poses
+  const PoseTrack track = estimate.track();
+  for (int i = 0; i < truth.size(); ++i) {
+    const TimedPose& pose = truth.track()[i];
+    time_s.push_back(pose.time_s);
+    true_mm.push_back(numbers(pose.world_from_camera.translation));
+    const bool tracked = estimate.states[i] != FrameState::lost;
+    state.push_back(!tracked                                     ? "lost"
+                    : estimate.states[i] == FrameState::keyframe ? "keyframe"
+                                                                 : "resected");
+    if (tracked && poses.sim3) {
+      position.push_back(poses.sim3->position_of_pose_mm.at(next));
+      rotation.push_back(poses.sim3->rotation_of_pose_rad.at(next));
+      aligned_mm.push_back(
+          numbers(poses.sim3->truth_from_estimate * track[next].world_from_camera.translation));
+    } else {
+      position.push_back(nullptr);
+      rotation.push_back(nullptr);
+      aligned_mm.push_back(nullptr);
+    }
+    if (tracked) ++next;
+  }
+  return {{"time_s", time_s},    {"position_error_mm", position}, {"rotation_error_rad", rotation},
+          {"truth_mm", true_mm}, {"estimate_mm", aligned_mm},     {"state", state}};
+}
+
+json depth_errors(const Truth& truth, const EstimateLayout& layout, const PoseErrors& poses,
+                  Progress& progress) {
+  std::vector<DepthError> metric, by_median;
+  for (int i = 0; i < truth.size(); ++i) {
+    progress.step();
+    if (!fs::exists(layout.depth(i))) continue;
+    const cv::Mat estimated = read_exr(layout.depth(i)), true_mm = truth.depth_mm(i);
+    if (poses.sim3)
+      if (const auto error = depth_error(estimated, true_mm, poses.sim3->truth_from_estimate.scale))
+        metric.push_back(*error);
+    if (const auto scale = median_scale(estimated, true_mm))
+      if (const auto error = depth_error(estimated, true_mm, *scale)) by_median.push_back(*error);
+  }
+  return {{"sim3", depth_json(mean_of(metric))}, {"median_scaled", depth_json(mean_of(by_median))}};
+}
+
+Visibility visibility_of(const Truth& truth, Progress& progress) {
+  Visibility visibility(truth.wall(), {});
+  for (int i = 0; i < truth.size(); ++i) {
+    visibility.add(truth.camera().lens, truth.track()[i].world_from_camera, truth.depth_mm(i));
+    progress.step();
+  }
+  return visibility;
+}
+
+json coverage_json(const Visibility& visibility) {
+  const double wall = visibility.wall_area_mm2();
+  const double seen = area_mm2(visibility.seen_wall());
+  json out = {{"wall_area_mm2", wall}, {"seen_area_mm2", seen}, {"seen_share", seen / wall}};
+  for (const unsigned times : {1u, 3u, 10u}) {
+    const double area = visibility.covered_area_mm2(times);
+    out[fmt::format("covered_{}_times_area_mm2", times)] = area;
+    out[fmt::format("covered_{}_times_share", times)] = area / wall;
+  }
+  return out;
+}
+
+// The map against the wall that was seen: placed by the trajectory, then by ICP from there.
+json surface_errors(const Estimate& estimate, const TriangleMesh& seen, const PoseErrors& poses) {
+  json out = {{"trajectory_aligned", nullptr},
+              {"icp_aligned", nullptr},
+              {"icp_scaled", nullptr},
+              {"icp", nullptr},
+              {"note", ""}};
+  if (estimate.map.empty()) out["note"] = "the estimate has no map";
+  if (!poses.sim3) out["note"] = "the map cannot be placed: " + poses.note;
+  if (seen.empty()) out["note"] = "no part of the wall was seen";
+  if (out["note"] != "") return out;
+  const TriangleMesh placed = transformed(estimate.map, poses.sim3->truth_from_estimate);
+  out["trajectory_aligned"] = surface_json(surface_error(placed, seen));
+  constexpr std::size_t kMapPoints = 20'000, kWallPoints = 100'000;  // for ICP alone
+  const std::vector<Vec3> of_map = sample_surface(placed, kMapPoints);
+  const std::vector<Vec3> of_wall = sample_surface(seen, kWallPoints);
+  for (const bool with_scale : {false, true}) {
+    const IcpResult found = icp(of_map, of_wall, {.with_scale = with_scale});
+    if (!found.converged) continue;
+    const auto error = surface_error(transformed(placed, found.target_from_source), seen);
+    out[with_scale ? "icp_scaled" : "icp_aligned"] = surface_json(error);
+    if (!with_scale) out["icp"] = transform_json(found.target_from_source);
+  }
+  return out;
+}
+
+}  // namespace
+
+json evaluate(const fs::path& dataset, const fs::path& estimate_folder, Progress& progress) {
+  const Truth truth = Truth::open(dataset);
+  const Estimate estimate = read_estimate(estimate_folder);
+  check(static_cast<int>(estimate.states.size()) == truth.size(),
+        "{}: estimate of {} frames, the dataset {} has {}", estimate_folder.string(),
+        estimate.states.size(), dataset.string(), truth.size());
+
+  json out;
+  progress.begin("evaluate: path");
+  const PoseErrors poses = pose_errors(truth.track(), estimate.track());
+  out["trajectory"] = trajectory_json(poses);
+  out["tracking"] = tracking_json(poses, estimate);
+  out["alignment"] =
+      transform_json(poses.sim3 ? std::optional(poses.sim3->truth_from_estimate) : std::nullopt);
+  out["frames"] = frames_json(truth, estimate, poses);
+  progress.end();
+
+  progress.begin("evaluate: depth", truth.size());
+  out["depth"] = depth_errors(truth, EstimateLayout{estimate_folder}, poses, progress);
+  progress.end();
+
+  progress.begin("evaluate: wall seen", truth.size());
+  const Visibility visibility = visibility_of(truth, progress);
+  out["coverage"] = coverage_json(visibility);
+  progress.end();
+
+  progress.begin("evaluate: surface");
+  out["surface"] = surface_errors(estimate, visibility.seen_wall(), poses);
+  progress.end();
+
+  out["time"] = time_json(estimate);
+  out["reconstruction"] = estimate.numbers;
+  return out;
+}
+
+}  // namespace rugae

@@ -1,0 +1,100 @@
+#include "validate/visibility.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/check.h"
+#include "core/units.h"
+
+namespace rugae {
+namespace {
+
+// The largest depth of the four pixels around a place in the image; NaN where none hit the wall.
+float depth_around(const cv::Mat& depth_mm, const Vec2& pixel) {
+  const int x0 = static_cast<int>(std::floor(pixel.x() - 0.5));
+  const int y0 = static_cast<int>(std::floor(pixel.y() - 0.5));
+  float largest = std::numeric_limits<float>::quiet_NaN();
+  for (int y = std::max(y0, 0); y <= std::min(y0 + 1, depth_mm.rows - 1); ++y)
+    for (int x = std::max(x0, 0); x <= std::min(x0 + 1, depth_mm.cols - 1); ++x) {
+      const float depth = depth_mm.at<float>(y, x);
+      if (!std::isnan(depth) && !(depth <= largest)) largest = depth;
+    }
+  return largest;
+}
+
+}  // namespace
+
+void VisibilityOptions::check() const {
+  rugae::check(max_incidence_rad > 0.0 && max_incidence_rad <= 0.5 * kPi,
+               "visibility: max_incidence_rad is {}, expected above 0 and at most pi/2",
+               max_incidence_rad);
+  rugae::check(depth_margin_mm >= 0.0 && depth_margin_share >= 0.0,
+               "visibility: depth margins are {} mm and {}, expected at least 0", depth_margin_mm,
+               depth_margin_share);
+}
+
+Visibility::Visibility(const TriangleMesh& wall, const VisibilityOptions& options)
+    : wall_(wall),
+      options_(options),
+      seen_(wall.triangles.size(), 0),
+      seen_well_(wall.triangles.size(), 0) {
+  options_.check();
+  centres_.reserve(wall.triangles.size());
+  normals_.reserve(wall.triangles.size());
+  for (std::size_t t = 0; t < wall.triangles.size(); ++t) {
+    const Vec3i& i = wall.triangles[t];
+    centres_.push_back((wall.vertices[i[0]] + wall.vertices[i[1]] + wall.vertices[i[2]]) / 3.0);
+    normals_.push_back(triangle_normal(wall, t));
+  }
+}
+
+void Visibility::add(const Lens& lens, const Rigid3& world_from_camera, const cv::Mat& depth_mm) {
+  check(depth_mm.type() == CV_32F && depth_mm.cols == lens.width && depth_mm.rows == lens.height,
+        "depth image is {}x{}, the lens {}x{}", depth_mm.cols, depth_mm.rows, lens.width,
+        lens.height);
+  const Rigid3 cam_from_world = world_from_camera.inverse();
+  const LensProjector projector(lens);
+  const Mat3 rotation = cam_from_world.rotation.toRotationMatrix();
+  const double cos_limit = std::cos(options_.max_incidence_rad);
+  // Each triangle writes its own counters: the result does not depend on threads.
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, centres_.size(), 4096),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      for (std::size_t t = range.begin(); t < range.end(); ++t) {
+                        const Vec3 p_cam = rotation * centres_[t] + cam_from_world.translation;
+                        if (!(p_cam.z() > 0.0)) continue;
+                        const std::optional<Vec2> pixel = projector.project(p_cam);
+                        if (!pixel || !lens.contains(*pixel)) continue;
+                        const float depth = depth_around(depth_mm, *pixel);
+                        const double limit =
+                            depth * (1.0 + options_.depth_margin_share) + options_.depth_margin_mm;
+                        if (!(p_cam.z() <= limit)) continue;  // hidden, or nothing was hit there
+                        ++seen_[t];
+                        const double cos_incidence =
+                            std::abs((rotation * normals_[t]).dot(p_cam)) / p_cam.norm();
+                        if (cos_incidence >= cos_limit) ++seen_well_[t];
+                      }
+                    });
+}
+
+double Visibility::wall_area_mm2() const { return area_mm2(wall_); }
+
+double Visibility::covered_area_mm2(std::uint32_t times) const {
+  double area = 0.0;
+  for (std::size_t t = 0; t < seen_well_.size(); ++t)
+    if (seen_well_[t] >= times) area += triangle_area_mm2(wall_, t);
+  return area;
+}
+
+TriangleMesh Visibility::seen_wall() const {
+  TriangleMesh seen = wall_;
+  seen.triangles.clear();
+  for (std::size_t t = 0; t < seen_.size(); ++t)
+    if (seen_[t] > 0) seen.triangles.push_back(wall_.triangles[t]);
+  return seen;
+}
+
+}  // namespace rugae
