@@ -26,7 +26,7 @@ constexpr double kValuesPerCycle = 2.0;
 
 /// A triangle wave with rounded corners: 0 at even v, 1 at odd v.
 double to_and_fro(double v) {
-  constexpr double kSharpness = 0.95;
+  constexpr double kSharpness = 0.9;
   return 0.5 - 0.5 * std::asin(kSharpness * std::cos(kPi * v)) / std::asin(kSharpness);
 }
 

@@ -53,7 +53,7 @@ std::string place_text(const Vec3& p) {
 }
 
 Clearance least_clearance(const FreeSpace& space, const std::vector<Vec3>& positions,
-                          const ArcLength& arc) {
+                          const Travel& arc) {
   const int steps = static_cast<int>(std::ceil(arc.total() / kCheckStepMm));
   std::vector<double> depth(steps + 1);
   const auto point = [&](int i) {
@@ -85,7 +85,7 @@ PlannedPath::Impl follow_track(const PoseTrack& track, const std::string& name) 
   PlannedPath::Impl impl;
   impl.positions = interpolating_controls(points);
   impl.rotations = interpolating_controls(rotations);
-  impl.length_mm = ArcLength(impl.positions).total();
+  impl.length_mm = arc_length(impl.positions).total();
   impl.parameter_at = [times, slopes = monotone_slopes(times)](double fraction) {
     const double time = times.front() + fraction * (times.back() - times.front());
     const auto next = std::upper_bound(times.begin() + 1, times.end() - 1, time);

@@ -26,7 +26,7 @@ struct Clearance {
 };
 /// Looks at steps of at most 0.25 mm along the curve of the control points.
 Clearance least_clearance(const FreeSpace& space, const std::vector<Vec3>& positions,
-                          const ArcLength& arc);
+                          const Travel& arc);
 
 /// Throws Error "trajectory 'name' would leave the stomach: ..." unless the clearance suffices.
 void require_clearance(const Clearance& found, double clearance_mm, const std::string& name);

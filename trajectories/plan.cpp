@@ -20,15 +20,23 @@ constexpr double kEndRoomMm = 1.0;
 constexpr double kSmallestLoopMm = 3.0;
 constexpr double kLargestLoopShare = 0.5;  // of the tube's widest free extent
 constexpr int kMostLoops = 8;              // times those asked for
+constexpr double kWallDistanceMm = 30.0;   // typical, from the camera along its axis
 constexpr double kMostPasses = 2000.0;
-
-struct Curve {
-  std::vector<Vec3> positions;
-  double length_mm;
-};
 
 /// tau of control point k: the spline begins at the second and ends at the last but one.
 double tau_of(int k, int count) { return (k - 1.0) / (count - 3.0); }
+
+/// What is steady, or bursts, is the motion of the picture: a turn by one radian moves the picture
+/// of a wall d mm away as far as a step of d mm to the side does. So the capsule slows down where
+/// it turns: d travelled = sqrt(|dp|^2 + (d |dtheta|)^2), by (root mean square) composition since
+/// the two may point anywhere.
+Travel picture_motion(const PlannedPath::Impl& impl) {
+  return {static_cast<int>(impl.positions.size()) - 3,
+          [positions = impl.positions, rotations = impl.rotations](double u) {
+            return std::hypot(spline_slope(positions, u).norm(),
+                              kWallDistanceMm * spline_turn_rate(rotations, u).norm());
+          }};
+}
 
 class LengthFit {
  public:
@@ -70,7 +78,7 @@ class LengthFit {
       list.push_back(course_.world_from_camera(size, tau_of(k, controls_)).rotation);
     return list;
   }
-  double length(const CourseSize& size) const { return ArcLength(positions(size)).total(); }
+  double length(const CourseSize& size) const { return arc_length(positions(size)).total(); }
 
  private:
   Fit fit_loops(CourseSize size) const {
@@ -139,15 +147,15 @@ PlannedPath::Impl plan_in(const FreeSpace& space, const TrajectoryOptions& optio
           place_text(space.widest_point()), widest);
     PlannedPath::Impl impl;
     impl.positions = lengths.positions(size);
-    const ArcLength arc(impl.positions);
+    const Travel arc = arc_length(impl.positions);
     found = least_clearance(space, impl.positions, arc);
     if (found.least_mm >= options.clearance_mm) {
       impl.rotations = lengths.rotations(size);
       impl.length_mm = arc.total();
       impl.min_clearance_mm = found.least_mm;
       const TimeLaw law(options.pace, seed);
-      impl.parameter_at = [arc, law](double fraction) {
-        return arc.parameter(arc.total() * law.share(fraction));
+      impl.parameter_at = [law, motion = picture_motion(impl)](double fraction) {
+        return motion.parameter(motion.total() * law.share(fraction));
       };
       return impl;
     }
@@ -172,7 +180,7 @@ PlannedPath plan_path(const TriangleMesh& wall, const TrajectoryOptions& options
     return PlannedPath(std::make_shared<const PlannedPath::Impl>(plan_in(space, options, seed)));
 
   auto impl = follow_track(read_tum(options.file), options.file.string());
-  const Clearance found = least_clearance(space, impl.positions, ArcLength(impl.positions));
+  const Clearance found = least_clearance(space, impl.positions, arc_length(impl.positions));
   require_clearance(found, options.clearance_mm, options.name);
   impl.min_clearance_mm = found.least_mm;
   return PlannedPath(std::make_shared<const PlannedPath::Impl>(std::move(impl)));

@@ -90,34 +90,61 @@ std::vector<Quat> interpolating_controls(const std::vector<Quat>& rotations) {
   return control;
 }
 
-ArcLength::ArcLength(const std::vector<Vec3>& control) : control_(control), upto_{0.0} {
-  const int spans = static_cast<int>(control.size()) - 3;
+Vec3 spline_turn_rate(const std::vector<Quat>& control, double u) {
+  // With A_j = exp(B_j d_j): the rate is A_3^-1 (A_2^-1 B_1' d_1 + B_2' d_2) + B_3' d_3, d_j being
+  // the rotation vectors between neighbours.
+  const auto [i, t] = spline_span(u, control.size());
+  const auto w = bspline_weights(t);
+  const auto slope = bspline_slopes(t);
+  const std::array<double, 3> cumulative = {1.0 - w[0], w[2] + w[3], w[3]};
+  const std::array<double, 3> rates = {-slope[0], slope[2] + slope[3], slope[3]};
+  Vec3 rate = Vec3::Zero();
+  for (int j = 0; j < 3; ++j) {
+    const Quat step = same_side(Quat::Identity(), control[i + j].conjugate() * control[i + j + 1]);
+    const double sine = step.vec().norm();
+    const double angle_over_sine = sine < 1e-12 ? 2.0 : 2.0 * std::atan2(sine, step.w()) / sine;
+    rate = power(step, cumulative[j]).conjugate() * rate + rates[j] * angle_over_sine * step.vec();
+  }
+  return rate;
+}
+
+Travel::Travel(int spans, Speed speed) : speed_(std::move(speed)), upto_{0.0} {
   for (int k = 0; k < spans; ++k) upto_.push_back(upto_.back() + within(k, 1.0));
 }
 
-double ArcLength::within(int span, double t) const {
+double Travel::within(int span, double t) const {
   double sum = 0.0;
   for (std::size_t g = 0; g < kGaussNodes.size(); ++g)
-    sum += kGaussWeights[g] * spline_slope(control_, span + t * kGaussNodes[g]).norm();
+    sum += kGaussWeights[g] * speed_(span + t * kGaussNodes[g]);
   return t * sum;
 }
 
-double ArcLength::parameter(double s) const {
+double Travel::at(double u) const {
+  const auto [span, t] = spline_span(u, upto_.size() + 2);
+  return upto_[span] + within(span, t);
+}
+
+double Travel::parameter(double travelled) const {
   constexpr int kMaxRounds = 60;
-  const auto it = std::upper_bound(upto_.begin(), upto_.end(), s);
+  constexpr double kTolerance = 1e-12;  // of the total
+  const auto it = std::upper_bound(upto_.begin(), upto_.end(), travelled);
   const int last = static_cast<int>(upto_.size()) - 2;
   const int span = std::clamp(static_cast<int>(it - upto_.begin()) - 1, 0, last);
-  const double wanted = s - upto_[span];
+  const double wanted = travelled - upto_[span];
   double low = 0.0, high = 1.0, t = 0.5;
   for (int round = 0; round < kMaxRounds; ++round) {
     const double miss = within(span, t) - wanted;
-    if (std::abs(miss) <= 1e-12 * std::max(1.0, total())) break;
+    if (std::abs(miss) <= kTolerance * total()) break;
     (miss > 0.0 ? high : low) = t;
-    const double speed = spline_slope(control_, span + t).norm();
-    const double newton = t - miss / speed;
+    const double newton = t - miss / speed_(span + t);
     t = newton > low && newton < high ? newton : 0.5 * (low + high);
   }
   return span + t;
+}
+
+Travel arc_length(const std::vector<Vec3>& control) {
+  return {static_cast<int>(control.size()) - 3,
+          [control](double u) { return spline_slope(control, u).norm(); }};
 }
 
 }  // namespace rugae

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include "core/types.h"
@@ -62,19 +63,29 @@ std::vector<Vec3> interpolating_controls(const std::vector<Vec3>& points);
 /// The same for rotations, to 1e-12 rad; neighbours less than half a turn apart.
 std::vector<Quat> interpolating_controls(const std::vector<Quat>& rotations);
 
-/// Lengths along a curve: the table of arc length over its spans, by Gauss-Legendre quadrature.
-class ArcLength {
+/// Speed of rotation of the spline, rad a unit of u, as a vector in the rotated axes.
+Vec3 spline_turn_rate(const std::vector<Quat>& control, double u);
+
+/// The integral of a positive speed over the spans [0, 1], [1, 2], ... of a spline, by
+/// Gauss-Legendre quadrature, and its inverse.
+class Travel {
  public:
-  explicit ArcLength(const std::vector<Vec3>& control);
+  using Speed = std::function<double(double u)>;
+  Travel(int spans, Speed speed);
   double total() const { return upto_.back(); }
-  /// The parameter at arc length `s` from the start, by Newton's method, guarded by bisection.
-  double parameter(double s) const;
+  /// Travelled from u = 0 to `u`.
+  double at(double u) const;
+  /// Where `travelled` is reached, by Newton's method guarded by bisection.
+  double parameter(double travelled) const;
 
  private:
   double within(int span, double t) const;
 
-  std::vector<Vec3> control_;
-  std::vector<double> upto_;  // arc length at u = 0, 1, ...
+  Speed speed_;
+  std::vector<double> upto_;  // at u = 0, 1, ...
 };
+
+/// Travel by arc length along the curve of the control points.
+Travel arc_length(const std::vector<Vec3>& control);
 
 }  // namespace rugae
