@@ -5,7 +5,6 @@
 #include "core/check.h"
 #include "core/files.h"
 #include "core/mesh_io.h"
-#include "dataset/camera_yaml.h"
 #include "dataset/frame_list.h"
 #include "dataset/image_io.h"
 #include "dataset/manifest.h"
