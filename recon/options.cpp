@@ -52,6 +52,11 @@ void fields(Visitor& v, AlignOptions& o) {
 }
 
 template <typename Visitor>
+void fields(Visitor& v, TrackOptions& o) {
+  v.number("spacing_px", o.spacing_px, 2.0, 200.0);
+}
+
+template <typename Visitor>
 void fields(Visitor& v, BundleOptions& o) {
   v.number("huber_px", o.huber_px, 1e-3, 1000.0);
   v.angle("min_parallax", o.min_parallax_rad, 0.0, 0.5 * kPi);
@@ -83,6 +88,7 @@ void fields(Visitor& v, ReconOptions& o) {
   v.section("preprocess", o.preprocess);
   v.section("keyframes", o.keyframes);
   v.section("align", o.align);
+  v.section("tracks", o.tracks);
   v.section("bundle", o.bundle);
   v.section("mosaic", o.mosaic);
   v.section("shading", o.shading);
@@ -208,6 +214,7 @@ void ReflectionOptions::check() const { check_all(*this, "reflections"); }
 void PreprocessOptions::check() const { check_all(*this, "preprocess"); }
 void KeyframeOptions::check() const { check_all(*this, "keyframes"); }
 void AlignOptions::check() const { check_all(*this, "align"); }
+void TrackOptions::check() const { check_all(*this, "tracks"); }
 void BundleOptions::check() const { check_all(*this, "bundle"); }
 void MosaicOptions::check() const { check_all(*this, "mosaic"); }
 void ShadingOptions::check() const { check_all(*this, "shading"); }

@@ -43,6 +43,11 @@ struct AlignOptions {
   void check() const;
 };
 
+struct TrackOptions {
+  double spacing_px = 14.0;  // least distance of the points followed, at 640 px width
+  void check() const;
+};
+
 struct BundleOptions {
   double huber_px = 1.0;
   double min_parallax_rad = 0.01;
@@ -74,6 +79,7 @@ struct ReconOptions {
   PreprocessOptions preprocess;
   KeyframeOptions keyframes;
   AlignOptions align;
+  TrackOptions tracks;
   BundleOptions bundle;
   MosaicOptions mosaic;
   ShadingOptions shading;

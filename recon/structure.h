@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "cameras/camera.h"
+#include "core/progress.h"
 #include "core/rigid3.h"
 #include "recon/align.h"
 #include "recon/options.h"
@@ -15,13 +17,16 @@ struct Track {
   struct Observation {
     int keyframe = -1;  // position in the list of key frames, not the frame's index
     Vec2 pixel;
+    Vec2 ray = Vec2::Zero();  // (x/z, y/z) of the pixel, set by set_rays()
+    bool inlier = true;       // false: does not agree with the point; never in a finished structure
   };
   std::vector<Observation> observations;
   Vec3 point = Vec3::Zero();  // world, map units
   bool triangulated = false;
 };
 
-/// Key frame poses and points, in a world of arbitrary scale whose origin is the first key frame.
+/// Key frame poses and points. The world is the camera of the first key frame that was placed, and
+/// the map unit is the median depth of the points that camera sees: one camera fixes no scale.
 struct Structure {
   std::vector<int> frames;             // of the key frames, as selected
   std::vector<bool> placed;            // false: this key frame could not be placed
@@ -30,6 +35,28 @@ struct Structure {
   double mean_reprojection_px = 0.0;
   int iterations = 0;
   bool converged = false;
+
+  int placed_count() const;
 };
+
+/// Rays of all observations from their pixels; an observation the lens has no ray for is removed.
+void set_rays(std::vector<Track>& tracks, const Lens& lens);
+
+/// Places the key frames one after another from the best pair on and adjusts all of them jointly.
+/// `frames` are the key frames' indices, `lens` that of the preprocessed frames. Where the chain
+/// breaks a new segment begins; segments that share enough points are joined, and of those that
+/// cannot be joined the largest is returned: key frames of the others are not placed. Throws
+/// nothing for hopeless input: then no key frame is placed.
+Structure build_structure(const std::vector<int>& frames, std::vector<Track> tracks,
+                          const Lens& lens, const BundleOptions& options, Progress& progress);
+
+/// The joint adjustment over all placed key frames, in rounds between which the observations are
+/// judged; what does not agree is removed, the structure is normalised, and its numbers are set.
+void finish_structure(Structure& structure, const Lens& lens, const BundleOptions& options,
+                      Progress& progress);
+
+/// Moves the world into the camera of the first placed key frame and scales it so that the median
+/// depth of the points it sees is one.
+void normalise(Structure& structure);
 
 }  // namespace rugae

@@ -1,0 +1,267 @@
+#include "recon/growth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "recon/bundle.h"
+#include "recon/resection.h"
+#include "recon/triangulation.h"
+#include "recon/two_view.h"
+
+namespace rugae {
+namespace {
+
+constexpr double kTwoViewHubers = 1.5;  // RANSAC threshold of the start, times huber_px
+constexpr double kOutlierHubers = 4.0;  // observations further off than this do not belong
+constexpr int kStartWindow = 12;        // key frames a starting pair may be apart
+constexpr int kStartsTried = 6;         // first key frames of starting pairs looked at
+constexpr int kMinStartInliers = 40;
+constexpr double kGoodParallaxRad = 0.06;  // more than this adds nothing to a start: 3.4 degrees
+constexpr int kLocalKeyframes = 6;         // adjusted after each placement
+constexpr double kGlobalGrowth = 1.25;     // all are adjusted when their number grew by this
+constexpr int kLocalIterations = 6;
+constexpr int kGlobalIterations = 12;
+
+std::vector<Sight> sights_of(const Structure& s, const Track& track, bool inliers_only,
+                             std::vector<std::size_t>* which = nullptr) {
+  std::vector<Sight> sights;
+  for (std::size_t i = 0; i < track.observations.size(); ++i) {
+    const auto& o = track.observations[i];
+    if (!s.placed[o.keyframe] || (inliers_only && !o.inlier)) continue;
+    sights.push_back({s.cam_from_world[o.keyframe], o.ray});
+    if (which != nullptr) which->push_back(i);
+  }
+  return sights;
+}
+
+void triangulate_track(const Structure& s, Track& track, double focal_px, double max_px,
+                       const BundleOptions& options) {
+  std::vector<std::size_t> which;
+  const std::vector<Sight> sights = sights_of(s, track, false, &which);
+  track.triangulated = false;
+  if (sights.size() < 2) return;
+  const auto robust = triangulate_robust(sights, max_px / focal_px, options.min_parallax_rad);
+  if (!robust) return;
+  track.point = robust->point;
+  track.triangulated = true;
+  for (std::size_t i = 0; i < which.size(); ++i)
+    track.observations[which[i]].inlier = robust->inlier[i];
+}
+
+struct Shared {
+  std::vector<Vec2> first, second;
+  std::vector<std::size_t> tracks;
+};
+
+// Tracks that both key frames see.
+Shared shared_tracks(const Structure& s, int first, int second) {
+  Shared shared;
+  for (std::size_t t = 0; t < s.tracks.size(); ++t) {
+    const Track::Observation *a = nullptr, *b = nullptr;
+    for (const auto& o : s.tracks[t].observations) {
+      if (o.keyframe == first) a = &o;
+      if (o.keyframe == second) b = &o;
+    }
+    if (a == nullptr || b == nullptr) continue;
+    shared.first.push_back(a->ray);
+    shared.second.push_back(b->ray);
+    shared.tracks.push_back(t);
+  }
+  return shared;
+}
+
+struct Start {
+  int first = -1, second = -1;
+  TwoView view;
+  Shared shared;
+};
+
+// The pair whose inliers and parallax together are best: many points, seen from places far enough
+// apart that their depth is known.
+std::optional<Start> best_start(const Structure& s, const std::vector<char>& available,
+                                double focal_px, const BundleOptions& options) {
+  std::optional<Start> best;
+  double best_score = 0.0;
+  std::vector<int> keys;
+  for (int k = 0; k < static_cast<int>(available.size()); ++k)
+    if (available[k]) keys.push_back(k);
+  // First members are spread over the segment, so that one bad stretch cannot spoil the start.
+  const int n = static_cast<int>(keys.size());
+  const int stride = std::max(1, (n - 1) / kStartsTried);
+  for (int i = 0; i + 1 < n; i += stride) {
+    for (int j = i + 1; j < n && keys[j] <= keys[i] + kStartWindow; ++j) {
+      Shared shared = shared_tracks(s, keys[i], keys[j]);
+      if (static_cast<int>(shared.tracks.size()) < kMinStartInliers) break;
+      auto view =
+          two_view(shared.first, shared.second, focal_px, kTwoViewHubers * options.huber_px);
+      if (!view || view->inliers < kMinStartInliers) continue;
+      if (!(view->median_parallax_rad >= options.min_parallax_rad)) continue;
+      const double score = view->inliers * std::min(view->median_parallax_rad, kGoodParallaxRad) *
+                           view->inliers / static_cast<double>(shared.tracks.size());
+      if (score > best_score) {
+        best_score = score;
+        best = Start{keys[i], keys[j], std::move(*view), std::move(shared)};
+      }
+    }
+  }
+  return best;
+}
+
+// Known points that a key frame sees.
+void known_points(const Structure& s, int keyframe, std::vector<Vec3>& points,
+                  std::vector<Vec2>& rays) {
+  for (const Track& track : s.tracks) {
+    if (!track.triangulated) continue;
+    for (const auto& o : track.observations) {
+      if (o.keyframe != keyframe) continue;
+      points.push_back(track.point);
+      rays.push_back(o.ray);
+    }
+  }
+}
+
+// The placed key frames that share most points with `keyframe`, and itself.
+std::vector<int> neighbourhood(const Structure& s, int keyframe) {
+  std::vector<int> shared(s.frames.size(), 0);
+  for (const Track& track : s.tracks) {
+    if (!track.triangulated) continue;
+    const bool sees =
+        std::any_of(track.observations.begin(), track.observations.end(),
+                    [&](const auto& o) { return o.keyframe == keyframe && o.inlier; });
+    if (!sees) continue;
+    for (const auto& o : track.observations) shared[o.keyframe] += s.placed[o.keyframe] && o.inlier;
+  }
+  std::vector<int> order;
+  for (int k = 0; k < static_cast<int>(shared.size()); ++k)
+    if (shared[k] > 0) order.push_back(k);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return shared[a] > shared[b]; });
+  if (static_cast<int>(order.size()) > kLocalKeyframes) order.resize(kLocalKeyframes);
+  return order;
+}
+
+void triangulate_seen(Structure& s, int keyframe, double focal_px, double max_px,
+                      const BundleOptions& options) {
+  for (Track& track : s.tracks) {
+    for (auto& o : track.observations) {
+      if (o.keyframe != keyframe) continue;
+      if (!track.triangulated)
+        triangulate_track(s, track, focal_px, max_px, options);
+      else
+        o.inlier =
+            reprojection_px(s.cam_from_world[keyframe], track.point, o.ray, focal_px) <= max_px;
+      break;
+    }
+  }
+}
+
+void begin_with(Structure& s, const Start& start, const BundleOptions& options) {
+  s.placed[start.first] = s.placed[start.second] = true;
+  s.cam_from_world[start.first] = Rigid3{};
+  s.cam_from_world[start.second] = start.view.second_from_first;
+  for (std::size_t i = 0; i < start.shared.tracks.size(); ++i) {
+    if (!start.view.inlier[i]) continue;
+    Track& track = s.tracks[start.shared.tracks[i]];
+    const std::vector<Sight> sights = sights_of(s, track, false);
+    if (!(parallax_rad(sights, start.view.points[i]) >= options.min_parallax_rad)) continue;
+    track.point = start.view.points[i];
+    track.triangulated = true;
+  }
+}
+
+// Points seen by each key frame that is available and not placed.
+std::vector<int> known_counts(const Structure& s, const std::vector<char>& available) {
+  std::vector<int> counts(s.frames.size(), 0);
+  for (const Track& track : s.tracks) {
+    if (!track.triangulated) continue;
+    for (const auto& o : track.observations)
+      counts[o.keyframe] += available[o.keyframe] && !s.placed[o.keyframe];
+  }
+  return counts;
+}
+
+}  // namespace
+
+void update_points(Structure& structure, double focal_px, double max_px,
+                   const BundleOptions& options) {
+  for (Track& track : structure.tracks) {
+    if (track.triangulated) {
+      for (auto& o : track.observations)
+        if (structure.placed[o.keyframe])
+          o.inlier = reprojection_px(structure.cam_from_world[o.keyframe], track.point, o.ray,
+                                     focal_px) <= max_px;
+      const std::vector<Sight> sights = sights_of(structure, track, true);
+      track.triangulated =
+          sights.size() >= 2 && parallax_rad(sights, track.point) >= options.min_parallax_rad;
+    }
+    if (!track.triangulated) triangulate_track(structure, track, focal_px, max_px, options);
+  }
+}
+
+void adjust_all(Structure& structure, double focal_px, const BundleOptions& options, int rounds,
+                double function_tolerance) {
+  const double max_px = kOutlierHubers * options.huber_px;
+  for (int round = 0; round < rounds; ++round) {
+    BundleScope scope;
+    scope.max_iterations = options.max_iterations;
+    scope.function_tolerance = function_tolerance;
+    const BundleReport report = bundle_adjust(structure, focal_px, options, scope);
+    structure.iterations = report.iterations;
+    structure.converged = report.converged;
+    update_points(structure, focal_px, max_px, options);
+  }
+}
+
+bool grow_segment(Structure& s, const std::vector<char>& available, double focal_px,
+                  const BundleOptions& options, Progress& progress) {
+  const double max_px = kOutlierHubers * options.huber_px;
+  const auto start = best_start(s, available, focal_px, options);
+  if (!start) return false;
+  begin_with(s, *start, options);
+  progress.step(2);
+  int placed = 2, placed_at_global = 2;
+  BundleScope global;
+  global.max_iterations = kGlobalIterations;
+  global.function_tolerance = 1e-4;
+  bundle_adjust(s, focal_px, options, global);
+  update_points(s, focal_px, max_px, options);
+
+  std::vector<int> tried(s.frames.size(), 0);  // with how many points it failed
+  for (;;) {
+    const std::vector<int> counts = known_counts(s, available);
+    int next = -1;
+    for (int k = 0; k < static_cast<int>(counts.size()); ++k) {
+      if (counts[k] < options.min_resection_inliers || counts[k] <= tried[k]) continue;
+      if (next < 0 || counts[k] > counts[next]) next = k;
+    }
+    if (next < 0) break;
+    std::vector<Vec3> points;
+    std::vector<Vec2> rays;
+    known_points(s, next, points, rays);
+    const auto placement = place_by_points(points, rays, focal_px, options);
+    if (!placement) {
+      tried[next] = counts[next];
+      continue;
+    }
+    s.placed[next] = true;
+    s.cam_from_world[next] = placement->cam_from_world;
+    ++placed;
+    progress.step();
+    triangulate_seen(s, next, focal_px, max_px, options);
+    if (placed >= kGlobalGrowth * placed_at_global) {
+      bundle_adjust(s, focal_px, options, global);
+      update_points(s, focal_px, max_px, options);
+      placed_at_global = placed;
+    } else {
+      BundleScope local;
+      local.free_keyframes = neighbourhood(s, next);
+      local.max_iterations = kLocalIterations;
+      local.function_tolerance = 1e-3;
+      bundle_adjust(s, focal_px, options, local);
+    }
+  }
+  return true;
+}
+
+}  // namespace rugae

@@ -1,0 +1,160 @@
+#include "recon/resection.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
+
+#include "recon/bundle.h"
+#include "recon/tracks.h"
+
+namespace rugae {
+namespace {
+
+constexpr int kRansacIterations = 300;
+constexpr double kRansacConfidence = 0.9999;
+constexpr double kInlierHubers = 3.0;     // an inlier is within this many times huber_px
+constexpr double kMinInlierShare = 0.25;  // fewer: chance could have found them
+constexpr int kMinPoints = 6;
+constexpr int kRefinements = 2;
+constexpr int kFramesAtOnce = 16;  // between two steps of the progress line
+
+// Sights of known points from one frame.
+struct Sighted {
+  std::vector<Vec3> points;
+  std::vector<Vec2> rays;
+};
+
+// Follows the triangulated points of one key frame into a frame.
+void follow(const FrameSource& frames, const Structure& structure, int keyframe,
+            const Frame& moving, const AlignOptions& align_options, std::uint64_t seed,
+            Sighted& sighted) {
+  AlignGuess guess;
+  std::vector<const Track*> tracks;
+  for (const Track& track : structure.tracks) {
+    if (!track.triangulated) continue;
+    for (const auto& o : track.observations) {
+      if (o.keyframe != keyframe || !o.inlier) continue;
+      guess.reference_points.push_back(o.pixel);
+      tracks.push_back(&track);
+    }
+  }
+  if (static_cast<int>(tracks.size()) < kMinPoints) return;
+  const Frame reference = frames.frame(structure.frames[keyframe]);
+  const auto pair = align(reference, moving, align_options,
+                          pair_seed(seed, reference.index, moving.index), guess);
+  if (!pair) return;
+  for (std::size_t i = 0; i < pair->point_index.size(); ++i) {
+    const auto ray = ray_of(frames.lens(), pair->moving_px[i]);
+    if (!ray) continue;
+    sighted.points.push_back(tracks[pair->point_index[i]]->point);
+    sighted.rays.push_back(*ray);
+  }
+}
+
+}  // namespace
+
+std::optional<Placement> place_by_points(const std::vector<Vec3>& points,
+                                         const std::vector<Vec2>& rays, double focal_px,
+                                         const BundleOptions& options) {
+  const std::size_t n = points.size();
+  if (static_cast<int>(n) < std::max(kMinPoints, options.min_resection_inliers)) return {};
+  std::vector<cv::Point3d> objects;
+  std::vector<cv::Point2d> pixels;
+  for (std::size_t i = 0; i < n; ++i) {
+    objects.emplace_back(points[i].x(), points[i].y(), points[i].z());
+    pixels.emplace_back(focal_px * rays[i].x(), focal_px * rays[i].y());
+  }
+  const cv::Mat k = (cv::Mat_<double>(3, 3) << focal_px, 0, 0, 0, focal_px, 0, 0, 0, 1);
+  const double threshold_px = kInlierHubers * options.huber_px;
+  cv::Mat rotation_vector, translation, rotation;
+  if (!cv::solvePnPRansac(objects, pixels, k, cv::noArray(), rotation_vector, translation, false,
+                          kRansacIterations, static_cast<float>(2.0 * threshold_px),
+                          kRansacConfidence, cv::noArray(), cv::SOLVEPNP_AP3P))
+    return {};
+  cv::Rodrigues(rotation_vector, rotation);
+  Mat3 r;
+  Vec3 t;
+  cv::cv2eigen(rotation, r);
+  cv::cv2eigen(translation, t);
+  if (!r.allFinite() || !t.allFinite()) return {};
+
+  Placement placement;
+  placement.cam_from_world = Rigid3(r, t);
+  const auto count = [&](double limit_px) {
+    placement.inlier.assign(n, 0);
+    placement.inliers = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      placement.inlier[i] =
+          reprojection_px(placement.cam_from_world, points[i], rays[i], focal_px) <= limit_px;
+      placement.inliers += placement.inlier[i];
+    }
+  };
+  count(2.0 * threshold_px);
+  for (int round = 0; round < kRefinements; ++round) {
+    Sighted good;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!placement.inlier[i]) continue;
+      good.points.push_back(points[i]);
+      good.rays.push_back(rays[i]);
+    }
+    refine_pose(placement.cam_from_world, good.points, good.rays, focal_px, options.huber_px, 20);
+    count(threshold_px);
+  }
+  if (placement.inliers < options.min_resection_inliers) return {};
+  if (placement.inliers < kMinInlierShare * static_cast<double>(n)) return {};
+  return placement;
+}
+
+std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
+                                                 const Structure& structure,
+                                                 const AlignOptions& align_options,
+                                                 const BundleOptions& options, std::uint64_t seed,
+                                                 Progress& progress) {
+  const int n = frames.size();
+  std::vector<std::optional<Rigid3>> poses(n);
+  std::vector<int> placed_frames, placed_keyframes;  // ascending frame indices and their positions
+  std::vector<char> is_placed_keyframe(n, 0);
+  for (std::size_t k = 0; k < structure.frames.size(); ++k) {
+    if (!structure.placed[k]) continue;
+    poses[structure.frames[k]] = structure.cam_from_world[k];
+    is_placed_keyframe[structure.frames[k]] = 1;
+    placed_frames.push_back(structure.frames[k]);
+    placed_keyframes.push_back(static_cast<int>(k));
+  }
+  std::vector<int> rest;
+  for (int f = 0; f < n; ++f)
+    if (!is_placed_keyframe[f]) rest.push_back(f);
+  progress.begin("resection", rest.size());
+  if (placed_frames.empty()) {
+    progress.end("nothing to place frames in");
+    return poses;
+  }
+  const double focal_px = frames.lens().fx;
+  for (std::size_t begin = 0; begin < rest.size(); begin += kFramesAtOnce) {
+    const std::size_t end = std::min(rest.size(), begin + kFramesAtOnce);
+    tbb::parallel_for(begin, end, [&](std::size_t i) {
+      const int f = rest[i];
+      const Frame moving = frames.frame(f);
+      const auto after = static_cast<std::size_t>(
+          std::lower_bound(placed_frames.begin(), placed_frames.end(), f) - placed_frames.begin());
+      Sighted sighted;
+      if (after > 0)
+        follow(frames, structure, placed_keyframes[after - 1], moving, align_options, seed,
+               sighted);
+      if (after < placed_keyframes.size())
+        follow(frames, structure, placed_keyframes[after], moving, align_options, seed, sighted);
+      if (const auto p = place_by_points(sighted.points, sighted.rays, focal_px, options))
+        poses[f] = p->cam_from_world;
+    });
+    progress.step(end - begin);
+  }
+  const auto lost =
+      std::count_if(poses.begin(), poses.end(), [](const auto& pose) { return !pose; });
+  progress.end(fmt::format("{} of {} frames placed, {} lost", n - lost, n, lost));
+  return poses;
+}
+
+}  // namespace rugae

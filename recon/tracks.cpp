@@ -1,0 +1,185 @@
+#include "recon/tracks.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <opencv2/imgproc.hpp>
+#include <unordered_map>
+
+#include "core/random.h"
+
+namespace rugae {
+namespace {
+
+constexpr double kReferenceWidth = 640.0;  // pixel options are meant at this width
+constexpr double kCornerQuality = 0.002;  // of the best corner: weak texture counts, noise does not
+constexpr int kCornerBlock = 7;           // px
+constexpr int kBorder = 8;                // px: no corner nearer to where the image ends
+
+// Occupied cells of side `spacing`: a point is taken when another lies within `spacing` of it.
+class Occupied {
+ public:
+  explicit Occupied(double spacing) : spacing_(spacing) {}
+  bool taken(const Vec2& p) const {
+    const auto [cx, cy] = cell(p);
+    for (int y = cy - 1; y <= cy + 1; ++y)
+      for (int x = cx - 1; x <= cx + 1; ++x) {
+        const auto found = cells_.find(key(x, y));
+        if (found == cells_.end()) continue;
+        for (const Vec2& q : found->second)
+          if ((q - p).norm() < spacing_) return true;
+      }
+    return false;
+  }
+  void add(const Vec2& p) {
+    const auto [cx, cy] = cell(p);
+    cells_[key(cx, cy)].push_back(p);
+  }
+
+ private:
+  std::pair<int, int> cell(const Vec2& p) const {
+    return {static_cast<int>(std::floor(p.x() / spacing_)),
+            static_cast<int>(std::floor(p.y() / spacing_))};
+  }
+  static std::int64_t key(int x, int y) { return (static_cast<std::int64_t>(y) << 32) + x; }
+  double spacing_;
+  std::unordered_map<std::int64_t, std::vector<Vec2>> cells_;
+};
+
+// Corners in order of strength, (0.5, 0.5) convention.
+std::vector<Vec2> corners(const Frame& frame, double spacing_px) {
+  cv::Mat mask;
+  cv::bitwise_and(frame.valid, ~frame.reflection, mask);
+  cv::erode(mask, mask,
+            cv::getStructuringElement(cv::MORPH_RECT, {2 * kBorder + 1, 2 * kBorder + 1}), {-1, -1},
+            1, cv::BORDER_CONSTANT, cv::Scalar(0));
+  std::vector<cv::Point2f> found;
+  cv::goodFeaturesToTrack(frame.gray, found, 0, kCornerQuality, spacing_px, mask, kCornerBlock);
+  std::vector<Vec2> points;
+  points.reserve(found.size());
+  for (const cv::Point2f& p : found) points.emplace_back(p.x + 0.5, p.y + 0.5);
+  return points;
+}
+
+}  // namespace
+
+std::optional<Vec2> ray_of(const Lens& lens, const Vec2& pixel) {
+  const auto direction = lens.unproject(pixel);
+  if (!direction || !(direction->z() > 0.0)) return std::nullopt;
+  return Vec2(direction->head<2>() / direction->z());
+}
+
+std::uint64_t pair_seed(std::uint64_t seed, int reference, int moving) {
+  const auto words =
+      random_words(seed, Purpose::recon_ransac, static_cast<std::uint32_t>(reference),
+                   static_cast<std::uint64_t>(moving));
+  return (static_cast<std::uint64_t>(words[1]) << 32) | words[0];
+}
+
+void set_rays(std::vector<Track>& tracks, const Lens& lens) {
+  for (Track& track : tracks) {
+    std::erase_if(track.observations, [&](Track::Observation& o) {
+      const auto ray = ray_of(lens, o.pixel);
+      if (ray) o.ray = *ray;
+      return !ray;
+    });
+  }
+}
+
+std::vector<Vec2> TrackChain::starts(int keyframe, const std::vector<Vec2>& fresh,
+                                     double spacing_px) {
+  if (static_cast<int>(through_.size()) <= keyframe) through_.resize(keyframe + 1);
+  std::vector<int>& through = through_[keyframe];
+  Occupied occupied(spacing_px);
+  std::vector<Vec2> points;
+  for (const int t : through) {
+    points.push_back(tracks_[t].observations.back().pixel);
+    for (const auto& o : tracks_[t].observations)
+      if (o.keyframe == keyframe) points.back() = o.pixel;
+    occupied.add(points.back());
+  }
+  for (const Vec2& p : fresh) {
+    if (occupied.taken(p)) continue;
+    occupied.add(p);
+    Track track;
+    track.observations.push_back({keyframe, p});
+    through.push_back(static_cast<int>(tracks_.size()));
+    tracks_.push_back(std::move(track));
+    points.push_back(p);
+  }
+  started_ = through;
+  return points;
+}
+
+void TrackChain::add(int moving, const std::vector<int>& point_index,
+                     const std::vector<Vec2>& moving_px, double spacing_px) {
+  if (static_cast<int>(through_.size()) <= moving) through_.resize(moving + 1);
+  // Two tracks that ran together are one point seen twice: the second is not continued.
+  Occupied occupied(0.25 * spacing_px);
+  for (const int t : through_[moving])
+    for (const auto& o : tracks_[t].observations)
+      if (o.keyframe == moving) occupied.add(o.pixel);
+  for (std::size_t i = 0; i < point_index.size(); ++i) {
+    const int t = started_[point_index[i]];
+    Track& track = tracks_[t];
+    const bool known = std::any_of(track.observations.begin(), track.observations.end(),
+                                   [&](const auto& o) { return o.keyframe == moving; });
+    if (known || occupied.taken(moving_px[i])) continue;
+    occupied.add(moving_px[i]);
+    track.observations.push_back({moving, moving_px[i]});
+    through_[moving].push_back(t);
+  }
+}
+
+std::vector<Track> TrackChain::finish() {
+  std::erase_if(tracks_, [](const Track& t) { return t.observations.size() < 2; });
+  for (Track& track : tracks_)
+    std::sort(track.observations.begin(), track.observations.end(),
+              [](const auto& a, const auto& b) { return a.keyframe < b.keyframe; });
+  return std::move(tracks_);
+}
+
+Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
+                       const AlignOptions& align_options, const TrackOptions& options,
+                       std::uint64_t seed, Progress& progress) {
+  const int n = static_cast<int>(keyframes.frames.size());
+  const double spacing_px = options.spacing_px * frames.lens().width / kReferenceWidth;
+  progress.begin("pairwise alignment", n);
+  Followed followed;
+  TrackChain chain;
+  std::deque<Frame> window;  // key frames k to k + neighbours
+  int failed = 0;
+  for (int k = 0; k < n; ++k) {
+    const int last = std::min(n - 1, k + align_options.neighbours);
+    while (static_cast<int>(window.size()) <= last - k)
+      window.push_back(frames.frame(keyframes.frames[k + static_cast<int>(window.size())]));
+    AlignGuess guess;
+    guess.reference_points = chain.starts(k, corners(window.front(), spacing_px), spacing_px);
+    std::vector<std::optional<PairAlignment>> found(last - k);
+    tbb::parallel_for(0, last - k, [&](int i) {
+      const Frame& moving = window[i + 1];
+      found[i] = align(window.front(), moving, align_options,
+                       pair_seed(seed, window.front().index, moving.index), guess);
+    });
+    for (int i = 0; i < last - k; ++i) {
+      if (!found[i]) {
+        ++failed;
+        continue;
+      }
+      chain.add(k + 1 + i, found[i]->point_index, found[i]->moving_px, spacing_px);
+      followed.pairs.push_back(std::move(*found[i]));
+    }
+    window.pop_front();
+    progress.step();
+  }
+  followed.tracks = chain.finish();
+  set_rays(followed.tracks, frames.lens());
+  progress.end(fmt::format("{} pairs, {} failed, {} tracks", followed.pairs.size(), failed,
+                           followed.tracks.size()));
+  return followed;
+}
+
+}  // namespace rugae

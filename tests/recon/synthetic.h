@@ -1,0 +1,68 @@
+#pragma once
+// Worlds with known answers: points on a bumpy closed cavity, seen by a camera that moves inside
+// it; and plain pictures of that cavity. Nothing here comes from the renderer.
+
+#include <cstdint>
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "cameras/camera.h"
+#include "core/rigid3.h"
+#include "recon/structure.h"
+
+namespace rugae::synthetic {
+
+struct Options {
+  int cameras = 12;
+  double step_rad = 0.1;       // of the path's angle between cameras: 5 mm at the default size
+  int points = 3000;           // on the whole wall
+  int max_run = 12;            // cameras a track lives for at most
+  double noise_px = 0.0;       // standard deviation of each coordinate of an observation
+  double outlier_share = 0.0;  // of observations moved by up to 40 px in each coordinate
+  double unit = 1.0;           // length of the world's unit: 1000 gives the world in micrometres
+  Rigid3 moved;                // applied to the whole world, in its unit
+  std::uint64_t seed = 1;
+};
+
+struct World {
+  Lens lens;                           // pinhole, 640 x 480, 100 degrees across
+  std::vector<Rigid3> cam_from_world;  // the truth
+  std::vector<Vec3> points;            // the truth, of each track
+  std::vector<Track> tracks;           // observations with rays; no points yet
+  std::vector<int> frames;             // 0, 1, 2, ...
+};
+
+/// Distance of the wall from the cavity's centre in a unit direction: about 40 mm, folds of 3 mm.
+double wall_radius_mm(const Vec3& direction);
+/// World from camera at an angle along the path, mm: inside the cavity, looking at the wall.
+Rigid3 world_from_camera(double angle_rad);
+Lens lens_of(int width, int height);
+World make_world(const Options& options);
+
+/// What the camera sees: mottled wall under a light at the camera, 8-bit BGR. The noise is white
+/// with that standard deviation in grey levels.
+cv::Mat picture(const Lens& lens, const Rigid3& world_from_camera, double noise_levels,
+                std::uint64_t seed, int frame);
+
+/// A folder of numbered pictures with a calibration file next to it, as a user would have it.
+struct Recording {
+  std::filesystem::path images, calibration;
+  std::vector<Rigid3> world_from_camera;
+};
+Recording record(const std::filesystem::path& folder, const Lens& lens,
+                 const std::vector<Rigid3>& world_from_camera, double noise_levels = 0.0);
+
+/// Root mean square distance of estimated camera centres to the true ones after the best Sim(3),
+/// and the largest rotation error after it; both over placed cameras only.
+struct PathError {
+  double rmse = 0.0, worst_rotation_rad = 0.0,
+         path_extent = 0.0;  // rmse and extent in the truth's unit
+  int cameras = 0;
+};
+PathError path_error(const std::vector<Rigid3>& estimated_world_from_camera,
+                     const std::vector<Rigid3>& true_world_from_camera);
+PathError path_error(const Structure& structure, const World& world);
+
+}  // namespace rugae::synthetic
