@@ -10,6 +10,7 @@
 #include "core/progress.h"
 #include "recon/mosaic.h"
 #include "recon/options.h"
+#include "recon/shading.h"
 
 namespace rugae {
 
@@ -18,21 +19,28 @@ namespace rugae {
 struct MosaicDepth {
   cv::Mat depth;          // CV_32F
   int sparse_points = 0;  // that placed it
+  int rejected = 0;       // points that disagree with their neighbours
   double residual = 0.0;  // RMS of depth against the sparse points, map units
+  double held_out = 0.0;  // mean absolute error at points left out of the fit, relative to depth
+  double relief_scale = 0.0;  // of the shading relief; 1 where shading alone is right, 0 where it
+                              // tells nothing, negative where convex and concave are swapped
+  LightEstimate light;
 };
 
-/// Tsai and Shah's relief fitted to the sparse points seen in the mosaic; empty when too few points
-/// fix it.
+/// Tsai and Shah's relief fitted to the sparse points seen in the mosaic,
+///   ln z(pixel) = smooth(pixel) + relief_scale * highpass(relief)(pixel) / f,
+/// both unknowns jointly; empty when too few points fix it. The depth ends where points end.
 std::optional<MosaicDepth> place_mosaic(const Mosaic& mosaic, const Structure& structure,
                                         const Lens& lens, const ShadingOptions& options);
 
-/// Fuses the placed mosaics (TSDF) into one coloured mesh.
+/// Fuses the placed mosaics (TSDF) into one coloured mesh; geometric normals point away from the
+/// cameras. Small pieces that hang in the air are left out. Empty when nothing was placed.
 TriangleMesh fuse_map(const std::vector<Mosaic>& mosaics,
                       const std::vector<std::optional<MosaicDepth>>& depths,
                       const Structure& structure, const Lens& lens, const MapOptions& options);
 
-/// z-depth of every key frame on the ORIGINAL (distorted) pixel grid, from the fused map by
-/// projection; NaN where the map has nothing.
+/// z-depth (CV_32F) of a key frame on the ORIGINAL (distorted) pixel grid, from the fused map: the
+/// nearest triangle on each pixel's ray; NaN where the map has nothing.
 cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world,
                        const Lens& original_lens);
 

@@ -1,0 +1,87 @@
+// Depth of the map as a key frame sees it: each triangle is handed to the pixels it may cover, and
+// each pixel's own ray is intersected with it, so the lens is exact.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
+
+#include "recon/map.h"
+
+namespace rugae {
+namespace {
+
+/// A straight edge is curved by the lens: the box around the projected corners grows by one pixel
+/// and by this share of its size.
+constexpr double kCurvedEdgeMargin = 0.25;
+
+struct Corner {
+  Vec3 p_cam;
+  std::optional<Vec2> pixel;
+};
+
+/// Distance along `ray` to the triangle's plane where the ray meets its inside (Moeller and
+/// Trumbore, 1997, doi:10.1080/10867651.1997.10487468), either side; negative when it misses.
+double hit(const Vec3& ray, const Vec3& a, const Vec3& ab, const Vec3& ac) {
+  const Vec3 p = ray.cross(ac);
+  const double determinant = ab.dot(p);
+  if (determinant == 0.0) return -1.0;
+  // Neighbours share edges exactly; a rounding error must not open a slit between them.
+  constexpr double kEdge = 1e-9;
+  const double u = -a.dot(p) / determinant;
+  const Vec3 q = (-a).cross(ab);
+  const double v = ray.dot(q) / determinant;
+  if (!(u >= -kEdge && v >= -kEdge && u + v <= 1.0 + kEdge)) return -1.0;
+  return ac.dot(q) / determinant;
+}
+
+}  // namespace
+
+cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world,
+                       const Lens& original_lens) {
+  const Lens& lens = original_lens;
+  cv::Mat depth(lens.height, lens.width, CV_32F,
+                cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
+  std::vector<Corner> corners;
+  corners.reserve(map.vertices.size());
+  for (const Vec3& vertex : map.vertices) {
+    const Vec3 p_cam = cam_from_world * vertex;
+    corners.push_back({p_cam, p_cam.z() > 0.0 ? lens.project(p_cam) : std::nullopt});
+  }
+  std::vector<Vec3> rays(static_cast<std::size_t>(lens.width) * lens.height, Vec3::Zero());
+  for (int y = 0; y < lens.height; ++y)
+    for (int x = 0; x < lens.width; ++x)
+      if (const auto ray = lens.unproject({x + 0.5, y + 0.5}))
+        rays[static_cast<std::size_t>(y) * lens.width + x] = *ray;
+
+  for (const Vec3i& triangle : map.triangles) {
+    const std::array<const Corner*, 3> c = {&corners[triangle[0]], &corners[triangle[1]],
+                                            &corners[triangle[2]]};
+    Eigen::AlignedBox2d box;
+    int projected = 0;
+    for (const Corner* corner : c)
+      if (corner->pixel) box.extend(*corner->pixel), ++projected;
+    if (projected == 0) continue;
+    // A triangle that reaches behind the camera may cover anything.
+    if (projected < 3) box = {Vec2(0, 0), Vec2(lens.width, lens.height)};
+    const Vec2 margin = Vec2(1, 1) + kCurvedEdgeMargin * box.sizes();
+    const int left = std::max(0, static_cast<int>(std::floor(box.min().x() - margin.x())));
+    const int top = std::max(0, static_cast<int>(std::floor(box.min().y() - margin.y())));
+    const int right = std::min(lens.width - 1.0, std::ceil(box.max().x() + margin.x()));
+    const int bottom = std::min(lens.height - 1.0, std::ceil(box.max().y() + margin.y()));
+    if (left > right || top > bottom) continue;
+    const Vec3 ab = c[1]->p_cam - c[0]->p_cam, ac = c[2]->p_cam - c[0]->p_cam;
+    for (int y = top; y <= bottom; ++y)
+      for (int x = left; x <= right; ++x) {
+        const Vec3& ray = rays[static_cast<std::size_t>(y) * lens.width + x];
+        if (!(ray.z() > 0.0)) continue;
+        const double z = hit(ray, c[0]->p_cam, ab, ac) * ray.z();
+        float& nearest = depth.at<float>(y, x);
+        if (z > 0.0 && !(nearest <= z)) nearest = static_cast<float>(z);
+      }
+  }
+  return depth;
+}
+
+}  // namespace rugae
