@@ -1,0 +1,253 @@
+#include "apps/commands.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "core/files.h"
+#include "core/presets.h"
+#include "core/progress.h"
+#include "dataset/check_dataset.h"
+#include "dataset/observations.h"
+#include "recon/pipeline.h"
+#include "render/simulate.h"
+#include "studies/study.h"
+#include "validate/evaluate.h"
+
+namespace rugae {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// Machine-readable on request, else lines for people.
+void print(bool json, const Json& result, const std::string& text) {
+  std::printf("%s\n", json ? result.dump(2).c_str() : text.c_str());
+}
+
+void add_json_flag(CLI::App& command, bool& json) {
+  command.add_flag("--json", json, "Print the result as JSON");
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& app) {
+  struct Arguments {
+    SimulateOptions options;
+    fs::path out;
+    bool json = false, clean = false, no_labels = false;
+  };
+  const auto a = std::make_shared<Arguments>();
+  CLI::App& command = *app.add_subcommand(
+      "simulate", "Render a dataset: frames, times, calibration and exact truth");
+  command.add_option("--scene", a->options.scene, "Preset, YAML or mesh file")
+      ->capture_default_str();
+  command.add_option("--camera", a->options.camera, "Preset or YAML")->capture_default_str();
+  command.add_option("--trajectory", a->options.trajectory, "Preset 1 to 6 or YAML")
+      ->capture_default_str();
+  command.add_option("--resolution", a->options.resolution, "Wall detail: coarse, medium or fine")
+      ->capture_default_str();
+  command
+      .add_option("--frames", a->options.frames,
+                  "Frames over the whole path; 0: as many as in the paper")
+      ->capture_default_str();
+  command.add_option("--only-frame", a->options.only_frame, "Render this frame alone");
+  command.add_option("--seed", a->options.seed, "Draws the stomach, the path and the noise")
+      ->capture_default_str();
+  command.add_option("--threads", a->options.threads, "0: all processors")->capture_default_str();
+  command.add_flag("--clean", a->clean, "No sensor noise");
+  command.add_flag("--no-labels", a->no_labels, "Frames and poses only");
+  command.add_option("--out", a->out, "The dataset's folder")->required();
+  add_json_flag(command, a->json);
+  command.callback([a] {
+    a->options.noise = !a->clean;
+    a->options.labels = !a->no_labels;
+    Progress progress;
+    const SimulateResult r = simulate(a->options, a->out, progress);
+    const int rendered = r.frames - r.skipped;
+    const double rate = r.wall_s > 0.0 ? rendered / r.wall_s : 0.0;
+    const Json json = {{"dataset", a->out.string()},
+                       {"frames", r.frames},
+                       {"skipped", r.skipped},
+                       {"path_length_mm", r.path_length_mm},
+                       {"min_clearance_mm", r.min_clearance_mm},
+                       {"frames_per_s", rate},
+                       {"thread_seconds",
+                        {{"trace", r.trace_s},
+                         {"shade", r.shade_s},
+                         {"label", r.label_s},
+                         {"sensor", r.sensor_s},
+                         {"encode", r.encode_s},
+                         {"write", r.write_s}}}};
+    print(a->json, json,
+          fmt::format("{}: {} frames ({} from an earlier run), path {:.1f} mm, clearance {:.1f} "
+                      "mm, {:.1f} frames a "
+                      "second\nthread-seconds: trace {:.1f}, shade {:.1f}, labels {:.1f}, sensor "
+                      "{:.1f}, encode {:.1f}, "
+                      "write {:.1f}",
+                      a->out.string(), r.frames, r.skipped, r.path_length_mm, r.min_clearance_mm,
+                      rate, r.trace_s, r.shade_s, r.label_s, r.sensor_s, r.encode_s, r.write_s));
+  });
+}
+
+void add_reconstruct(CLI::App& app) {
+  struct Arguments {
+    fs::path input, calibration, options_file, out;
+    std::string method = "paper";
+    double fps = 30.0;
+    bool json = false;
+  };
+  const auto a = std::make_shared<Arguments>();
+  CLI::App& command =
+      *app.add_subcommand("reconstruct", "Estimate the path and the wall from frames alone");
+  command.add_option("input", a->input, "A dataset, or a folder of images with --calibration")
+      ->required();
+  command.add_option("--method", a->method, "paper")->capture_default_str();
+  command.add_option("--calibration", a->calibration, "Lens YAML; replaces the dataset's own");
+  command.add_option("--fps", a->fps, "Frame rate of a plain folder of images")
+      ->capture_default_str();
+  command.add_option("--options", a->options_file, "YAML with reconstruction options");
+  command.add_option("--out", a->out, "The estimate's folder")->required();
+  add_json_flag(command, a->json);
+  command.callback([a] {
+    ReconOptions options;
+    if (!a->options_file.empty()) read_options(YamlReader::from_file(a->options_file), options);
+    options.method = a->method;
+    options.check();
+    const Observations observations = Observations::open(a->input, a->calibration, a->fps);
+    make_folder(a->out);
+    Progress progress;
+    const Estimate estimate = reconstruct(observations, options, a->out, progress);
+    const std::size_t tracked = estimate.track().size();
+    Json json = {{"estimate", a->out.string()},
+                 {"frames", observations.size()},
+                 {"tracked", tracked},
+                 {"map_triangles", estimate.map.triangles.size()}};
+    for (const auto& [name, value] : estimate.numbers) json["numbers"][name] = value;
+    for (const StageTime& stage : estimate.stages)
+      json["stages"].push_back(
+          {{"name", stage.name}, {"seconds", stage.seconds}, {"peak_rss_mb", stage.peak_rss_mb}});
+    print(a->json, json,
+          fmt::format("{}: {} of {} frames tracked, map of {} triangles", a->out.string(), tracked,
+                      observations.size(), estimate.map.triangles.size()));
+  });
+}
+
+void add_evaluate(CLI::App& app) {
+  struct Arguments {
+    fs::path dataset, estimate, out;
+    bool json = false;
+  };
+  const auto a = std::make_shared<Arguments>();
+  CLI::App& command =
+      *app.add_subcommand("evaluate", "Measure an estimate against the exact truth");
+  command.add_option("dataset", a->dataset, "The dataset with its truth")->required();
+  command.add_option("estimate", a->estimate, "What reconstruct wrote")->required();
+  command.add_option("--out", a->out, "metrics.json");
+  add_json_flag(command, a->json);
+  command.callback([a] {
+    Progress progress;
+    const nlohmann::json metrics = evaluate(a->dataset, a->estimate, progress);
+    if (!a->out.empty()) write_atomic(a->out, metrics.dump(2) + "\n");
+    print(a->json, metrics, summary_text(metrics));
+  });
+}
+
+void add_run(CLI::App& app, int& exit_code) {
+  struct Arguments {
+    fs::path study, out;
+    bool json = false;
+  };
+  const auto a = std::make_shared<Arguments>();
+  CLI::App& command =
+      *app.add_subcommand("run", "The whole loop over a study: tables and a report");
+  command.add_option("study", a->study, "STUDY.yaml or a preset's name")->required();
+  command.add_option("--out", a->out, "The study's folder; a run that was stopped goes on there")
+      ->required();
+  add_json_flag(command, a->json);
+  command.callback([a, &exit_code] {
+    Progress progress;
+    const StudyResult result =
+        run_study(find_preset("studies", "study", a->study.string()), a->out, progress);
+    for (const std::string& gate : result.failed_gates)
+      std::fprintf(stderr, "gate failed: %s\n", gate.c_str());
+    constexpr int kGateFailed = 3;
+    if (!result.failed_gates.empty()) exit_code = kGateFailed;
+    print(a->json,
+          {{"cells", result.cells},
+           {"failed_gates", result.failed_gates},
+           {"report", result.report.string()}},
+          fmt::format("{} cells, {} gates failed, report: {}", result.cells,
+                      result.failed_gates.size(), result.report.string()));
+  });
+}
+
+void add_check(CLI::App& app, int& exit_code) {
+  struct Arguments {
+    fs::path dataset;
+    bool json = false;
+  };
+  const auto a = std::make_shared<Arguments>();
+  CLI::App& command = *app.add_subcommand("check", "Is this dataset whole and consistent?");
+  command.add_option("dataset", a->dataset)->required();
+  add_json_flag(command, a->json);
+  command.callback([a, &exit_code] {
+    const DatasetCheck result = check_dataset(a->dataset);
+    constexpr int kBadInput = 2;
+    if (!result.problems.empty()) exit_code = kBadInput;
+    std::string text;
+    for (const std::string& problem : result.problems) text += problem + "\n";
+    text += fmt::format(
+        "{}: {} frames, {} files, {}", a->dataset.string(), result.frames, result.files,
+        result.problems.empty() ? "sound" : fmt::format("{} problems", result.problems.size()));
+    print(a->json,
+          {{"problems", result.problems}, {"frames", result.frames}, {"files", result.files}},
+          text);
+  });
+}
+
+void add_list(CLI::App& app) {
+  struct Arguments {
+    std::string kind;
+    bool json = false;
+  };
+  const auto a = std::make_shared<Arguments>();
+  CLI::App& command = *app.add_subcommand("list", "Names of the presets");
+  command.add_option("kind", a->kind, "scenes, cameras, trajectories or studies")->required();
+  add_json_flag(command, a->json);
+  command.callback([a] {
+    const std::vector<std::string> kinds = {"scenes", "cameras", "trajectories", "studies"};
+    check(std::ranges::count(kinds, a->kind) > 0, "list '{}': no such kind{}; known: {}", a->kind,
+          did_you_mean(a->kind, kinds), fmt::join(kinds, ", "));
+    const auto names = preset_names(a->kind);
+    print(a->json, names, fmt::format("{}", fmt::join(names, "\n")));
+  });
+}
+
+std::string usage_error(const CLI::App& app, int argc, char** argv, const CLI::ParseError& error) {
+  std::vector<std::string> commands;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    commands.push_back(command->get_name());
+  if (argc > 1 && std::ranges::count(commands, argv[1]) == 0 && argv[1][0] != '-')
+    return fmt::format("'{}': no such command{}; known: {}", argv[1],
+                       did_you_mean(argv[1], commands), fmt::join(commands, ", "));
+  if (argc < 2)
+    return fmt::format("a command is missing; known: {}; see rugae --help",
+                       fmt::join(commands, ", "));
+  std::string text = error.what();
+  const auto* extras = dynamic_cast<const CLI::ExtrasError*>(&error);
+  if (extras && app.got_subcommand(argv[1])) {
+    std::vector<std::string> options;
+    for (const CLI::Option* option : app.get_subcommand(argv[1])->get_options())
+      for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
+    for (int i = 2; i < argc; ++i)
+      if (std::string(argv[i]).starts_with("--") && std::ranges::count(options, argv[i]) == 0)
+        return fmt::format("{}: unknown option '{}'{}", argv[1], argv[i],
+                           did_you_mean(argv[i], options));
+  }
+  return fmt::format("{}: {}; see rugae {} --help", argv[1], text, argv[1]);
+}
+
+}  // namespace rugae
