@@ -21,6 +21,10 @@ constexpr double kPatchDistanceMm = 30.0;
 constexpr double kFixation = 0.6;
 // Sways along the axis are smaller than those around it.
 constexpr double kSwayAlong = 0.6;
+constexpr double kSteadyEnds = 0.8;
+// The way out lies by this share farther from the axis, the way back by as much nearer to it, so
+// that the turn between them is wide.
+constexpr double kOutAndBack = 0.6;
 // Values of the random splines a cycle.
 constexpr double kValuesPerCycle = 2.0;
 
@@ -28,6 +32,13 @@ constexpr double kValuesPerCycle = 2.0;
 double to_and_fro(double v) {
   constexpr double kSharpness = 0.9;
   return 0.5 - 0.5 * std::asin(kSharpness * std::cos(kPi * v)) / std::asin(kSharpness);
+}
+
+/// A square wave with rounded edges: near 1 between 0 and 1, near -1 between 1 and 2.
+double out_or_back(double v) {
+  constexpr double kRounding = 0.3;
+  const double s = std::sin(kPi * v);
+  return s / std::sqrt(s * s + kRounding * kRounding);
 }
 
 std::vector<double> random_values(std::uint64_t seed, std::uint32_t channel, int count) {
@@ -66,15 +77,21 @@ Course::Place Course::place(const CourseSize& size, double tau) const {
     progress = (x - kLinger * std::sin(2.0 * kPi * x) / (2.0 * kPi)) / stations;
   }
   const double way = options_.retrace ? to_and_fro(2.0 * progress) : progress;
-  double share = to_and_fro(size.passes * (options_.retrace ? 0.5 : 1.0) * way);
+  const double v = size.passes * (options_.retrace ? 0.5 : 1.0) * way;
+  double share = to_and_fro(v);
   if (from_far_end_) share = 1.0 - share;
 
   Place at{};
   const double room = std::min(size.loop_mm, 0.25 * tube_.length_mm());
   const double length = std::max(tube_.length_mm() - 2.0 * room, 0.0) * size.reach;
   at.along_mm = 0.5 * tube_.length_mm() + (share - 0.5) * length;
-  at.around_rad = start_rad_ + hand_ * 2.0 * kPi * options_.winding_turns * size.reach * way;
+  // Without loops the direction turns between the ends and hardly at them, where the path turns.
+  const double turned =
+      size.loops > 0 ? way
+                     : way - kSteadyEnds * std::sin(2.0 * kPi * v) / (2.0 * kPi * size.passes);
+  at.around_rad = start_rad_ + hand_ * 2.0 * kPi * options_.winding_turns * size.reach * turned;
 
+  at.offset_share = options_.offset_share * (1.0 + kOutAndBack * out_or_back(v));
   if (size.loops > 0) {
     const double psi = 2.0 * kPi * size.loops * tau;
     const double a = size.loop_mm * (1.0 + kLoopSizeSpread * noise(loop_size_, tau));
@@ -103,7 +120,7 @@ Vec3 Course::point(const Place& at) const {
   const Vec2 outward(std::cos(at.around_rad), std::sin(at.around_rad));
   const Vec2 around(-outward.y(), outward.x());
   const double offset =
-      options_.offset_share * tube_.extent_mm(at.along_mm, at.around_rad) + at.shift_away_mm;
+      at.offset_share * tube_.extent_mm(at.along_mm, at.around_rad) + at.shift_away_mm;
   return tube_.point(along, offset * outward + at.shift_around_mm * around);
 }
 

@@ -30,7 +30,8 @@ class Course {
  private:
   struct Place {
     double along_mm;
-    double around_rad;  // direction from the axis in which the station lies
+    double around_rad;    // direction from the axis in which the station lies
+    double offset_share;  // of the way from the axis to the edge
     double shift_along_mm, shift_around_mm, shift_away_mm;  // of the loop
   };
   Place place(const CourseSize& size, double tau) const;

@@ -88,7 +88,14 @@ FreeSpace::FreeSpace(const TriangleMesh& wall) : wall_(wall) {
   depth_mm_.resize(static_cast<std::size_t>(size_.prod()));
   const int row = size_.x();
   tbb::parallel_for(tbb::blocked_range<int>(0, size_.y() * size_.z()), [&](const auto& rows) {
-    for (int i = rows.begin() * row; i < rows.end() * row; ++i) depth_mm_[i] = depth_mm(point(i));
+    for (int r = rows.begin(); r < rows.end(); ++r)
+      for (int i = r * row; i < (r + 1) * row; ++i) {
+        depth_mm_[i] = this->depth_mm(point(i));
+        // d mm outside the wall, the next d mm of the row are outside too.
+        const int end = (r + 1) * row;
+        for (double d = -depth_mm_[i] - step_mm_; d > 0.0 && i + 1 < end; d -= step_mm_)
+          depth_mm_[++i] = -d;
+      }
   });
 }
 
