@@ -21,18 +21,24 @@ struct SimulateOptions {
   bool vignetting = true;
   bool labels = true;  // truth images
   int threads = 0;     // 0: all
+  /// Throws Error naming the field.
   void check() const;
 };
 
 struct SimulateResult {
   int frames = 0, skipped = 0;  // skipped: found finished from an earlier run
-  double path_length_mm = 0.0, min_clearance_mm = 0.0;
-  double trace_s = 0.0, shade_s = 0.0, label_s = 0.0, sensor_s = 0.0,
-         encode_s = 0.0;  // thread-seconds; encode includes writing
-  double write_s = 0.0;
+  double path_length_mm = 0.0, min_clearance_mm = 0.0;  // 0 clearance: a track from a file
+  // Processor seconds of all threads over the frame loop. Writing is what the system spends while
+  // files are written; encoding the rest of that stage.
+  double trace_s = 0.0, shade_s = 0.0, label_s = 0.0, sensor_s = 0.0, encode_s = 0.0, write_s = 0.0;
   double wall_s = 0.0;  // of the frame loop, by the clock
 };
 
+/// Writes the dataset to `out`; goes on where an earlier run of the same options was stopped. The
+/// same options write the same bytes, whatever the threads. Memory holds two frames a thread,
+/// however many there are. With `only_frame` the folder receives that frame alone and never becomes
+/// a complete dataset. Throws Error for options, presets, meshes or folders that will not do, and
+/// Interrupted after Ctrl-C.
 SimulateResult simulate(const SimulateOptions& options, const std::filesystem::path& out,
                         Progress& progress);
 

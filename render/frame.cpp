@@ -1,0 +1,85 @@
+#include "render/frame.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <memory>
+
+#include "render/radiance.h"
+#include "render/thread_clock.h"
+
+namespace rugae {
+namespace {
+
+struct Scratch {
+  Tile tile;
+  SurfaceTile surface;
+  RadianceTile radiance;
+};
+
+void store(const Scratch& s, const RayTable& rays, bool vignetting, CleanFrame& frame) {
+  auto* out = frame.radiance.ptr<Vec3f>();
+  auto* masks = frame.truth.masks.ptr<unsigned char>();
+  for (int k = 0; k < s.surface.count; ++k) {
+    const int i = s.tile.pixel[s.surface.lane[k]];
+    const RadianceTile& r = s.radiance;
+    const float light = vignetting ? rays.vignetting[i] : 1.0f;
+    out[i] = light * Vec3f(r.red[k], r.green[k], r.blue[k]);
+    masks[i] |= kMaskValid;
+    if (r.coat[k] > kSpecularShare * luminance(r.red[k], r.green[k], r.blue[k]))
+      masks[i] |= kMaskSpecular;
+  }
+}
+
+}  // namespace
+
+FrameRenderer::FrameRenderer(const Scene& scene, const Camera& camera, const RenderOptions& options)
+    : FrameRenderer(Surface(scene), camera, options) {}
+
+FrameRenderer::FrameRenderer(Surface surface, const Camera& camera, const RenderOptions& options)
+    : surface_(std::move(surface)),
+      camera_(camera),
+      options_(options),
+      rays_(make_ray_table(camera.lens, camera.vignetting)),
+      raycaster_(surface_.wall()),
+      lens_(camera.lens) {}
+
+CleanFrame FrameRenderer::render(const Rigid3& world_from_camera, const Rigid3* next,
+                                 RenderTimes* times) const {
+  CleanFrame frame;
+  frame.radiance = cv::Mat(rays_.height, rays_.width, CV_32FC3, cv::Scalar::all(0.0));
+  if (options_.labels)
+    frame.truth = empty_truth(rays_.width, rays_.height, next != nullptr);
+  else
+    frame.truth.masks = cv::Mat(rays_.height, rays_.width, CV_8U, cv::Scalar(0));
+
+  const Mat3 rotation = world_from_camera.rotation.toRotationMatrix();
+  const int columns = (rays_.width + kTileWidth - 1) / kTileWidth;
+  const int rows = (rays_.height + kTileHeight - 1) / kTileHeight;
+  tbb::parallel_for(tbb::blocked_range<int>(0, columns * rows, 4), [&](const auto& range) {
+    const auto s = std::make_unique<Scratch>();
+    for (int t = range.begin(); t < range.end(); ++t) {
+      const double start = thread_seconds();
+      place_tile(rays_, rotation, t % columns * kTileWidth, t / columns * kTileHeight, s->tile);
+      const auto n = static_cast<std::size_t>(s->tile.count);
+      raycaster_.intersect(world_from_camera.translation, {s->tile.direction_world.data(), n},
+                           {s->tile.hit.data(), n});
+      const double traced = thread_seconds();
+      surface_.look_up(s->tile, rays_, s->surface);
+      shade(light_, s->tile, s->surface, s->radiance);
+      store(*s, rays_, options_.vignetting, frame);
+      const double shaded = thread_seconds();
+      if (options_.labels)
+        label_tile(s->tile, rays_, surface_, raycaster_, lens_, {world_from_camera, next},
+                   frame.truth);
+      if (times) {
+        times->trace_s += traced - start;
+        times->shade_s += shaded - traced;
+        times->label_s += thread_seconds() - shaded;
+      }
+    }
+  });
+  return frame;
+}
+
+}  // namespace rugae

@@ -1,0 +1,105 @@
+#include "render/shaded_view.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/check.h"
+#include "core/units.h"
+#include "render/raycaster.h"
+
+namespace rugae {
+namespace {
+
+// Of the light that reaches the camera from a wall seen edge-on: keeps outlines readable.
+constexpr float kAmbient = 0.25f;
+constexpr double kStepPast_mm = 1e-4;  // beyond a triangle that is left out
+
+// Colour of one ray, in sRGB.
+Vec3f look(const TriangleMesh& mesh, const Raycaster& raycaster, const Vec3& eye, const Vec3& ray,
+           const ShadedViewOptions& options) {
+  Vec3 from = eye;
+  Hit hit = raycaster.intersect(from, ray);
+  constexpr int kMostLayers = 64;
+  for (int layer = 0; options.cull_front && hit.met() && layer < kMostLayers; ++layer) {
+    if (triangle_normal(mesh, hit.triangle).dot(ray) > 0.0) break;
+    from += (hit.range_mm + kStepPast_mm) * ray;
+    hit = raycaster.intersect(from, ray);
+  }
+  if (!hit.met()) return options.background_srgb;
+  const Vec3i& t = mesh.triangles[hit.triangle];
+  const auto blend = [&](const std::vector<Vec3f>& values) -> Vec3f {
+    return (1.0f - hit.b1 - hit.b2) * values[t[0]] + hit.b1 * values[t[1]] + hit.b2 * values[t[2]];
+  };
+  Vec3f normal = triangle_normal(mesh, hit.triangle).cast<float>();
+  if (!mesh.normals.empty()) normal = blend(mesh.normals).normalized();
+  const float cosine = std::min(1.0f, std::abs(normal.dot(ray.cast<float>())));
+  const Vec3f colour = mesh.colors.empty() ? options.clay_srgb : blend(mesh.colors);
+  return colour * (kAmbient + (1.0f - kAmbient) * cosine);
+}
+
+}  // namespace
+
+cv::Mat shaded_view(const TriangleMesh& mesh, const Rigid3& cam_from_world, const Lens& lens,
+                    const ShadedViewOptions& options) {
+  check(options.samples >= 1, "shaded view: samples is {}, expected at least 1", options.samples);
+  const Raycaster raycaster(mesh);
+  const LensProjector projector(lens);
+  const Rigid3 world_from_cam = cam_from_world.inverse();
+  cv::Mat picture(lens.height, lens.width, CV_8UC3);
+  tbb::parallel_for(0, lens.height, [&](int y) {
+    for (int x = 0; x < lens.width; ++x) {
+      Vec3f sum = Vec3f::Zero();
+      for (int s = 0; s < options.samples * options.samples; ++s) {
+        const Vec2 pixel(x + (s % options.samples + 0.5) / options.samples,
+                         y + (s / options.samples + 0.5) / options.samples);
+        const auto ray = projector.unproject(pixel);
+        sum += ray ? look(mesh, raycaster, world_from_cam.translation,
+                          world_from_cam.rotation * *ray, options)
+                   : options.background_srgb;
+      }
+      sum *= 255.0f / static_cast<float>(options.samples * options.samples);
+      for (int c = 0; c < 3; ++c)
+        picture.at<cv::Vec3b>(y, x)[2 - c] =
+            static_cast<unsigned char>(std::clamp(sum[c] + 0.5f, 0.0f, 255.0f));
+    }
+  });
+  return picture;
+}
+
+Lens picture_lens(int width, int height) {
+  Lens lens;
+  lens.width = width;
+  lens.height = height;
+  constexpr double kFieldOfView_rad = rad_from_deg(30.0);
+  lens.fx = lens.fy = 0.5 * std::min(width, height) / std::tan(0.5 * kFieldOfView_rad);
+  lens.cx = 0.5 * width;
+  lens.cy = 0.5 * height;
+  return lens;
+}
+
+Rigid3 view_of_box(const Eigen::AlignedBox3d& box, const Vec3& from_world, const Vec3& up_world,
+                   const Lens& lens) {
+  const Vec3 back = from_world.normalized();  // the camera's -z
+  const Vec3 right = up_world.cross(back).normalized();
+  check(right.allFinite() && right.norm() > 0.5, "view: up is along the view");
+  Mat3 world_from_cam;
+  world_from_cam << right, back.cross(right) * -1.0, -back;
+  const Vec3 center = box.center();
+  // Far enough that every corner falls into the picture, with a margin.
+  constexpr double kMargin = 1.03;
+  double distance_mm = 0.0;
+  for (int k = 0; k < 8; ++k) {
+    const Vec3 corner = world_from_cam.transpose() *
+                        (box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k)) - center);
+    const double half_x = std::min(lens.cx, lens.width - lens.cx) / lens.fx,
+                 half_y = std::min(lens.cy, lens.height - lens.cy) / lens.fy;
+    const double needed = std::max(std::abs(corner.x()) / half_x, std::abs(corner.y()) / half_y);
+    distance_mm = std::max(distance_mm, kMargin * needed - corner.z());
+  }
+  return Rigid3(world_from_cam, center + distance_mm * back).inverse();
+}
+
+}  // namespace rugae

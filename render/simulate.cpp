@@ -1,0 +1,252 @@
+#include "render/simulate.h"
+
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
+
+#include <condition_variable>
+#include <future>
+#include <mutex>
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "core/units.h"
+#include "dataset/writer.h"
+#include "render/exposure_log.h"
+#include "render/frame.h"
+#include "render/sensor.h"
+#include "render/thread_clock.h"
+#include "trajectories/trajectory.h"
+
+namespace rugae {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+struct Path {
+  PoseTrack track;
+  double length_mm = 0.0, min_clearance_mm = 0.0;
+};
+
+// A user's track resampled at equal steps of its own duration.
+PoseTrack resampled(const PoseTrack& track, int frames, double fps) {
+  PoseTrack result;
+  const double first_s = track.front().time_s, last_s = track.back().time_s;
+  for (int i = 0; i < frames; ++i) {
+    const double time_s =
+        i + 1 == frames ? last_s : first_s + (last_s - first_s) * i / (frames - 1);
+    result.push_back({i / fps, *interpolate(track, time_s)});
+  }
+  return result;
+}
+
+Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajectory,
+               const Camera& camera, const TriangleMesh& wall) {
+  const int in_paper = std::max(1, trajectory.paper_number);
+  const int frames = options.frames > 0 ? options.frames : frames_of_trajectory(camera, in_paper);
+  if (!trajectory.file.empty()) {
+    PoseTrack track = read_tum(trajectory.file);
+    check(track.size() >= 2, "{}: {} poses, expected at least 2", trajectory.file.string(),
+          track.size());
+    check_inside(wall, track, trajectory.clearance_mm, trajectory.name);
+    if (options.frames > 0) track = resampled(track, frames, camera.sensor.fps);
+    return {track, length_mm(track), 0.0};
+  }
+  const PlannedPath path = plan_path(wall, trajectory, options.seed);
+  return {sample_path(path, frames, camera.sensor.fps), path.length_mm(), path.min_clearance_mm()};
+}
+
+DatasetInfo info_of(const SimulateOptions& options, int frames) {
+  DatasetInfo info;
+  info.scene = options.scene;
+  info.camera = options.camera;
+  info.trajectory = options.trajectory;
+  info.resolution = options.resolution;
+  info.seed = options.seed;
+  info.frames = frames;
+  info.labels = options.labels;
+  info.text = nlohmann::json{{"noise", options.noise}, {"vignetting", options.vignetting}}.dump();
+  return info;
+}
+
+// Frames go through a pipeline in the arena's threads; the thread that called waits, counts the
+// finished ones, and passes on the wish to stop. Whole frames run side by side, and their tiles too
+// where threads would idle, so few frames use all threads as well.
+class FrameLoop {
+ public:
+  FrameLoop(const FrameRenderer& renderer, const SensorModel& sensor, const DatasetWriter& writer,
+            const PoseTrack& track, ExposureLog* log)
+      : renderer_(renderer), sensor_(sensor), writer_(writer), track_(track), log_(log) {}
+
+  void run(const std::vector<int>& frames, int threads, Progress& progress,
+           std::map<int, Exposure>& exposures) {
+    exposures_ = &exposures;
+    auto done = std::async(std::launch::async, [&] {
+      const struct Finished {  // also when an exception leaves the pipeline
+        FrameLoop& loop;
+        ~Finished() {
+          const std::lock_guard lock(loop.mutex_);
+          loop.finished_ = true;
+          loop.changed_.notify_one();
+        }
+      } finished{*this};
+      tbb::task_arena arena(threads);
+      arena.execute([&] { pipeline(frames, 2 * static_cast<std::size_t>(threads)); });
+    });
+    try {
+      std::size_t reported = 0;
+      std::unique_lock lock(mutex_);
+      while (!finished_ || reported < rendered_) {
+        changed_.wait(lock, [&] { return finished_ || rendered_ > reported; });
+        const std::size_t now = rendered_;
+        lock.unlock();
+        if (now > reported) progress.step(now - reported);
+        reported = now;
+        lock.lock();
+        if (finished_) break;
+      }
+    } catch (...) {
+      stop_ = true;
+      done.wait();
+      throw;
+    }
+    done.get();
+  }
+
+  RenderTimes times;
+  std::atomic<double> sensor_s = 0.0, encode_s = 0.0, write_s = 0.0;
+
+ private:
+  void pipeline(const std::vector<int>& frames, std::size_t in_flight) {
+    std::size_t next = 0;
+    tbb::parallel_pipeline(in_flight,
+                           tbb::make_filter<void, int>(tbb::filter_mode::serial_in_order,
+                                                       [&](tbb::flow_control& control) {
+                                                         if (next == frames.size() || stop_) {
+                                                           control.stop();
+                                                           return -1;
+                                                         }
+                                                         return frames[next++];
+                                                       }) &
+                               tbb::make_filter<int, void>(tbb::filter_mode::parallel,
+                                                           [&](int frame) { make_frame(frame); }));
+  }
+
+  void make_frame(int frame) {
+    const auto i = static_cast<std::size_t>(frame);
+    const bool last = i + 1 == track_.size();
+    CleanFrame clean = renderer_.render(track_[i].world_from_camera,
+                                        last ? nullptr : &track_[i + 1].world_from_camera, &times);
+    const double start = thread_seconds();
+    const Exposure exposure = sensor_.expose(clean.radiance);
+    sensor_s += thread_seconds() - start;
+    const cv::Mat bgr =
+        sensor_.digitise(clean.radiance, exposure, frame, clean.truth.masks, &sensor_s);
+    {
+      const std::lock_guard lock(mutex_);
+      if (log_) log_->add(frame, exposure);
+      (*exposures_)[frame] = exposure;
+    }
+    const ThreadUsage before = thread_usage();
+    writer_.write_frame(frame, bgr, clean.truth);
+    const ThreadUsage after = thread_usage();
+    encode_s += after.user_s - before.user_s;
+    write_s += after.system_s - before.system_s;
+    const std::lock_guard lock(mutex_);
+    ++rendered_;
+    changed_.notify_one();
+  }
+
+  const FrameRenderer& renderer_;
+  const SensorModel& sensor_;
+  const DatasetWriter& writer_;
+  const PoseTrack& track_;
+  ExposureLog* log_;
+  std::map<int, Exposure>* exposures_ = nullptr;
+  std::atomic<bool> stop_ = false;
+  std::mutex mutex_;  // of what follows, the log and the exposures
+  std::condition_variable changed_;
+  std::size_t rendered_ = 0;
+  bool finished_ = false;
+};
+
+}  // namespace
+
+void SimulateOptions::check() const {
+  rugae::check(frames == 0 || frames >= 2, "frames is {}, expected at least 2", frames);
+  rugae::check(only_frame >= -1, "only-frame is {}, expected at least 0", only_frame);
+  rugae::check(threads >= 0, "threads is {}, expected at least 0", threads);
+  rugae::check(frames == 0 || only_frame < frames, "only-frame is {}, but there are {} frames",
+               only_frame, frames);
+}
+
+SimulateResult simulate(const SimulateOptions& options, const std::filesystem::path& out,
+                        Progress& progress) {
+  options.check();
+  const int threads =
+      options.threads > 0 ? options.threads : tbb::this_task_arena::max_concurrency();
+
+  progress.begin("scene");
+  const Camera camera = load_camera(options.camera);
+  const TrajectoryOptions trajectory = load_trajectory(options.trajectory);
+  const Scene scene = load_scene({options.scene, options.seed, options.resolution, trajectory.oil});
+  progress.end(fmt::format("{} triangles", scene.wall.triangles.size()));
+
+  progress.begin("path");
+  const Path path = find_path(options, trajectory, camera, scene.wall);
+  const int frames = static_cast<int>(path.track.size());
+  check(options.only_frame < frames, "only-frame is {}, but there are {} frames",
+        options.only_frame, frames);
+  progress.end(fmt::format("{:.1f} cm", cm_from_mm(path.length_mm)));
+
+  const bool whole = options.only_frame < 0;
+  std::map<int, Exposure> exposures = ExposureLog::read(out);
+  DatasetWriter writer(out, info_of(options, frames));
+  writer.write_scene(camera, path.track, scene.wall);
+  std::vector<int> todo;
+  for (int i = 0; i < frames; ++i)
+    if (whole ? !(writer.has_frame(i) && exposures.contains(i)) : i == options.only_frame)
+      todo.push_back(i);
+
+  SimulateResult result;
+  result.frames = static_cast<int>(todo.size());
+  result.skipped = whole ? frames - result.frames : 0;
+  result.path_length_mm = path.length_mm;
+  result.min_clearance_mm = path.min_clearance_mm;
+
+  progress.begin("frames", todo.size());
+  if (!todo.empty()) {
+    const FrameRenderer renderer(scene, camera, {options.vignetting, options.labels});
+    const SensorModel sensor(camera.sensor,
+                             {options.noise, trajectory.read_noise_factor, options.seed});
+    ExposureLog log(out, exposures);
+    FrameLoop loop(renderer, sensor, writer, path.track, &log);
+    const Clock::time_point loop_start = Clock::now();
+    loop.run(todo, threads, progress, exposures);
+    result.wall_s = seconds_since(loop_start);
+    result.trace_s = loop.times.trace_s;
+    result.shade_s = loop.times.shade_s;
+    result.label_s = loop.times.label_s;
+    result.sensor_s = loop.sensor_s;
+    result.encode_s = loop.encode_s;
+    result.write_s = loop.write_s;
+  }
+  progress.end(result.skipped > 0 ? fmt::format("{} found finished", result.skipped) : "");
+
+  if (whole) {
+    progress.begin("manifest");
+    std::vector<double> exposure_s, gain;
+    for (int i = 0; i < frames; ++i) {
+      exposure_s.push_back(exposures.at(i).time_s);
+      gain.push_back(exposures.at(i).gain);
+    }
+    writer.finish(exposure_s, gain);
+    progress.end();
+  }
+  return result;
+}
+
+}  // namespace rugae

@@ -1,0 +1,58 @@
+#pragma once
+// The wall at the hits of a tile: interpolated normals, and the mucosa's material.
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "render/tile.h"
+#include "scenes/scene.h"
+
+namespace rugae {
+
+/// What a material is asked about.
+struct MaterialQuery {
+  Vec3f rest_position_mm;
+  Vec3f normal;  // of the shading, by the mesh's winding
+  Region region = Region::unknown;
+  float footprint_mm = 0.0f;
+};
+/// Fills one sample a query; called once a tile, from many threads.
+using Material = std::function<void(std::span<const MaterialQuery>, std::span<MucosaSample>)>;
+
+/// The wall at the lanes of a tile that met it.
+struct SurfaceTile {
+  int count = 0;
+  Lanes<int> lane;              // of the tile
+  Lanes<Vec3f> shading_normal;  // world axes, facing the camera's side
+  Lanes<MaterialQuery> query;
+  Lanes<MucosaSample> material;
+};
+
+class Surface {
+ public:
+  /// Keeps references: the scene must outlive it. The material is the scene's mucosa.
+  explicit Surface(const Scene& scene);
+  /// A wall of any material; rest positions are the vertices.
+  Surface(const TriangleMesh& wall, Material material);
+
+  const TriangleMesh& wall() const { return *wall_; }
+  /// Unit geometric normal by the winding, world axes; zero for a triangle without area.
+  const Vec3f& geometric_normal(int triangle) const { return triangle_normals_[triangle]; }
+  /// Works out every lane that met the wall.
+  void look_up(const Tile& tile, const RayTable& rays, SurfaceTile& surface) const;
+
+ private:
+  struct Vertex {
+    Vec3f normal, rest_position_mm;
+    Region region;
+  };
+  void pack(const std::vector<Vec3>& rest_positions, const std::vector<Region>& regions);
+
+  const TriangleMesh* wall_;
+  Material material_;
+  std::vector<Vertex> vertices_;
+  std::vector<Vec3f> triangle_normals_;
+};
+
+}  // namespace rugae
