@@ -15,15 +15,18 @@ namespace rugae {
 
 struct PairAlignment {
   int reference = -1, moving = -1;  // frame indices
-  std::vector<Vec2> reference_px,
-      moving_px;  // inlier correspondences, (0.5, 0.5) convention, preprocessed frames
+  /// Inlier correspondences, (0.5, 0.5) convention, preprocessed frames: each the flow's match
+  /// refined on its own patch, not the homography's prediction.
+  std::vector<Vec2> reference_px, moving_px;
   std::vector<int> point_index;  // of each correspondence: its place in
                                  // AlignGuess::reference_points; empty when a grid was followed
   Mat3 ref_from_mov_homography = Mat3::Identity();
   Eigen::Matrix<double, 2, 3> ref_from_mov_affine =
       Eigen::Matrix<double, 2, 3>::Identity();  // refined
-  double mse = 0.0;  // mean squared intensity error over the patches, intensities in [0, 1]
-  int inliers = 0, iterations = 0;
+  double mse = 0.0;    // mean squared intensity error over the patches, intensities in [0, 1]
+  int matches = 0;     // of the flow, forward-backward consistent
+  int inliers = 0;     // of all homographies; those that could be refined are the correspondences
+  int iterations = 0;  // of Gauss-Newton
   bool converged = false;
 };
 
@@ -33,6 +36,7 @@ struct AlignGuess {
   /// that tracks chain over many key frames. Points outside the image are never inliers.
   std::vector<Vec2> reference_points;
   cv::Mat flow;  // CV_32FC2, px, a first guess of the flow from reference to moving; may be empty
+  bool affine = true;  // false: correspondences alone are wanted, no affine is fitted
 };
 
 /// Empty when the pair cannot be aligned (too few inliers). Correspondences are forward-backward

@@ -1,0 +1,243 @@
+#include "recon/align.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/random.h"
+#include "recon/keyframes.h"
+#include "recon/patch_align.h"
+#include "recon/refine.h"
+
+namespace rugae {
+namespace {
+
+constexpr double kReferenceWidthPx = 640.0;  // of the options in px
+constexpr int kFlowWidthPx = 320;            // the flow is measured at about this width
+constexpr double kRoundTripPx = 1.5;  // forward then backward flow must come back this near, at 640
+constexpr double kMinTexture = 1e-6;  // smaller eigenvalue of the structure tensor, [0, 1] per px
+constexpr double kMinInlierShare = 0.3;  // of the matches, on the first plane
+constexpr int kMaxPlanes = 6;
+constexpr int kBorderPx = 2;
+
+struct Match {
+  Vec2 reference_px, moving_px;
+  int point = -1;  // its place in the list of points
+};
+
+// CV_8U: wall whose look belongs to it, a pixel away from reflections and from the field's border.
+cv::Mat usable_pixels(const Frame& frame) {
+  cv::Mat usable = frame.valid & ~frame.reflection;
+  cv::erode(usable, usable, cv::Mat::ones(3, 3, CV_8U));
+  return usable;
+}
+
+// The most textured pixel of each cell: where the flow is measured best.
+std::vector<Vec2> grid_points(const Frame& frame, const cv::Mat& usable, int cell_px) {
+  cv::Mat gray, texture;
+  frame.gray.convertTo(gray, CV_32F, 1.0 / 255.0);
+  cv::cornerMinEigenVal(gray, texture, 7, 3);
+  std::vector<Vec2> points;
+  for (int y0 = kBorderPx; y0 + cell_px + kBorderPx <= gray.rows; y0 += cell_px) {
+    for (int x0 = kBorderPx; x0 + cell_px + kBorderPx <= gray.cols; x0 += cell_px) {
+      float best = static_cast<float>(kMinTexture);
+      int best_x = -1, best_y = -1;
+      for (int y = y0; y < y0 + cell_px; ++y) {
+        const auto* t = texture.ptr<float>(y);
+        const auto* u = usable.ptr<unsigned char>(y);
+        for (int x = x0; x < x0 + cell_px; ++x) {
+          if (!u[x] || !(t[x] > best)) continue;
+          best = t[x];
+          best_x = x;
+          best_y = y;
+        }
+      }
+      if (best_x >= 0) points.emplace_back(best_x + 0.5, best_y + 0.5);
+    }
+  }
+  return points;
+}
+
+// Bilinear; `p` in (0.5, 0.5) convention, held inside the image.
+Vec2 sample_flow(const cv::Mat& flow, const Vec2& p) {
+  const double x = std::clamp(p.x() - 0.5, 0.0, flow.cols - 1.001);
+  const double y = std::clamp(p.y() - 0.5, 0.0, flow.rows - 1.001);
+  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+  const double fx = x - ix, fy = y - iy;
+  const auto at = [&](int u, int v) {
+    const cv::Vec2f& f = flow.at<cv::Vec2f>(v, u);
+    return Vec2(f[0], f[1]);
+  };
+  return (1 - fy) * ((1 - fx) * at(ix, iy) + fx * at(ix + 1, iy)) +
+         fy * ((1 - fx) * at(ix, iy + 1) + fx * at(ix + 1, iy + 1));
+}
+
+bool mask_at(const cv::Mat& mask, const Vec2& p) {
+  return p.x() >= 0.0 && p.y() >= 0.0 && p.x() < mask.cols && p.y() < mask.rows &&
+         mask.at<unsigned char>(static_cast<int>(p.y()), static_cast<int>(p.x())) != 0;
+}
+
+// d (H p) / d p = (H_2x2 - (H p) h_3^T) / w.
+Mat2 local_linear(const Mat3& homography, const Vec2& p) {
+  const Vec3 q = homography * p.homogeneous();
+  const Vec2 image = q.hnormalized();
+  return (homography.topLeftCorner<2, 2>() - image * homography.block<1, 2>(2, 0)) / q.z();
+}
+
+Mat3 from_cv(const cv::Mat& m) {
+  Mat3 out;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) out(r, c) = m.at<double>(r, c);
+  return out;
+}
+
+// Matches that come back within the tolerance: forward flow at the points, backward flow at their
+// images.
+std::vector<Match> match(const Frame& reference, const Frame& moving, const AlignOptions& options,
+                         double scale, const AlignGuess& guess) {
+  const int shrink = std::max(1, reference.gray.cols / kFlowWidthPx);
+  const cv::Size size(reference.gray.cols / shrink, reference.gray.rows / shrink);
+  const cv::Rect whole(0, 0, size.width * shrink, size.height * shrink);
+  const auto shrunk = [&](const cv::Mat& image) {
+    cv::Mat small;
+    cv::resize(image(whole), small, size, 0, 0, cv::INTER_AREA);
+    return small;
+  };
+  const cv::Mat ref = shrunk(reference.gray), mov = shrunk(moving.gray);
+  cv::Mat initial;
+  if (!guess.flow.empty()) initial = shrunk(guess.flow) / shrink;
+  const cv::Mat forward = farneback_flow(ref, mov, initial);
+  const cv::Mat backward = farneback_flow(mov, ref, initial.empty() ? initial : cv::Mat(-forward));
+
+  const cv::Mat usable = usable_pixels(reference);
+  const int cell_px = std::max(2, static_cast<int>(std::lround(options.grid_px * scale)));
+  const std::vector<Vec2> points = guess.reference_points.empty()
+                                       ? grid_points(reference, usable, cell_px)
+                                       : guess.reference_points;
+  std::vector<Match> matches;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec2& p = points[i];
+    if (!mask_at(usable, p)) continue;
+    const Vec2 q = p + shrink * sample_flow(forward, p / shrink);
+    if (!mask_at(moving.valid, q)) continue;
+    const Vec2 back = q + shrink * sample_flow(backward, q / shrink);
+    if (!((back - p).norm() <= kRoundTripPx * scale)) continue;
+    matches.push_back({p, q, static_cast<int>(i)});
+  }
+  return matches;
+}
+
+// The homography ref from mov of the matches by RANSAC; its inliers move from `matches` to
+// `inliers`.
+std::optional<Mat3> take_homography(std::vector<Match>& matches, double threshold_px,
+                                    int ransac_seed, std::vector<Match>& inliers) {
+  std::vector<cv::Point2d> from, to;
+  for (const Match& m : matches) {
+    from.emplace_back(m.moving_px.x(), m.moving_px.y());
+    to.emplace_back(m.reference_px.x(), m.reference_px.y());
+  }
+  cv::UsacParams ransac;
+  ransac.confidence = 0.999;
+  ransac.isParallel = false;  // its parallel form depends on the order of threads
+  ransac.maxIterations = 2000;
+  ransac.threshold = threshold_px;
+  ransac.sampler = cv::SAMPLING_UNIFORM;
+  ransac.score = cv::SCORE_METHOD_MSAC;
+  ransac.loMethod = cv::LOCAL_OPTIM_INNER_LO;
+  ransac.randomGeneratorState = ransac_seed;
+  cv::Mat mask;
+  const cv::Mat found = cv::findHomography(from, to, mask, ransac);
+  if (found.empty() || mask.total() != matches.size()) return std::nullopt;
+  const Mat3 h = from_cv(found);
+  if (!h.allFinite() || !(std::abs(h.determinant()) > 1e-12)) return std::nullopt;
+  inliers.clear();
+  std::vector<Match> left;
+  for (std::size_t i = 0; i < matches.size(); ++i)
+    (mask.at<unsigned char>(static_cast<int>(i)) ? inliers : left).push_back(matches[i]);
+  matches = std::move(left);
+  return h;
+}
+
+// The inliers of one homography, each refined on its own patch.
+void refine(const PatchPair& pair, const std::vector<Match>& inliers, const Mat3& ref_from_mov,
+            bool indexed, PairAlignment& result) {
+  const Mat3 mov_from_ref = ref_from_mov.inverse();
+  std::vector<std::optional<Vec2>> refined(inliers.size());
+  tbb::parallel_for(std::size_t{0}, inliers.size(), [&](std::size_t i) {
+    const Match& m = inliers[i];
+    refined[i] = refine_point(pair.reference, pair.moving, m.reference_px, m.moving_px,
+                              local_linear(mov_from_ref, m.reference_px), {});
+  });
+  for (std::size_t i = 0; i < inliers.size(); ++i) {
+    if (!refined[i]) continue;
+    result.reference_px.push_back(inliers[i].reference_px);
+    result.moving_px.push_back(*refined[i]);
+    if (indexed) result.point_index.push_back(inliers[i].point);
+  }
+}
+
+// The affine over the patches at the inliers, started at their mean flow.
+void fit(PatchPair& pair, const std::vector<Match>& inliers, const AlignOptions& options,
+         double scale, PairAlignment& result) {
+  std::vector<Vec2> reference_px, moving_px;
+  Vec2 mean_flow = Vec2::Zero();
+  for (const Match& m : inliers) {
+    reference_px.push_back(m.reference_px);
+    moving_px.push_back(m.moving_px);
+    mean_flow += (m.reference_px - m.moving_px) / static_cast<double>(inliers.size());
+  }
+  const double radius_px = options.patch_radius_px * scale;
+  pair.reference_patches = circular_patches(reference_px, radius_px, pair.reference.size());
+  pair.moving_patches = circular_patches(moving_px, radius_px, pair.moving.size());
+  Affine2 start = Affine2::Identity();
+  start.col(2) = mean_flow;
+  const AffineFit found = fit_affine(pair, start, {options.stop_mse, options.max_iterations});
+  result.ref_from_mov_affine = found.ref_from_mov;
+  result.mse = found.mse;
+  result.iterations = found.iterations;
+  result.converged = found.converged;
+}
+
+}  // namespace
+
+std::optional<PairAlignment> align(const Frame& reference, const Frame& moving,
+                                   const AlignOptions& options, std::uint64_t seed,
+                                   const AlignGuess& guess) {
+  const double scale = reference.gray.cols / kReferenceWidthPx;
+  std::vector<Match> matches = match(reference, moving, options, scale, guess);
+  const auto enough = static_cast<std::size_t>(options.min_inliers);
+
+  PairAlignment result;
+  result.reference = reference.index;
+  result.moving = moving.index;
+  result.matches = static_cast<int>(matches.size());
+  PatchPair pair;
+  reference.gray.convertTo(pair.reference, CV_32F, 1.0 / 255.0);
+  moving.gray.convertTo(pair.moving, CV_32F, 1.0 / 255.0);
+  for (int plane = 0; plane < kMaxPlanes && matches.size() >= enough; ++plane) {
+    const auto word =
+        random_words(seed, Purpose::recon_ransac, static_cast<std::uint32_t>(reference.index),
+                     static_cast<std::uint64_t>(moving.index) * kMaxPlanes + plane);
+    std::vector<Match> inliers;
+    const std::optional<Mat3> h = take_homography(matches, options.ransac_threshold_px * scale,
+                                                  static_cast<int>(word[0] >> 1), inliers);
+    if (!h || inliers.size() < enough) break;
+    if (plane == 0) {
+      const double share = static_cast<double>(inliers.size()) / result.matches;
+      if (!(share >= kMinInlierShare)) return std::nullopt;
+      result.ref_from_mov_homography = *h;
+      if (guess.affine) fit(pair, inliers, options, scale, result);
+    }
+    result.inliers += static_cast<int>(inliers.size());
+    refine(pair, inliers, *h, !guess.reference_points.empty(), result);
+  }
+  if (result.reference_px.size() < enough) return std::nullopt;
+  return result;
+}
+
+}  // namespace rugae
