@@ -12,7 +12,7 @@
 namespace rugae {
 namespace {
 
-constexpr int kBlock = 8;  // cells along a block's edge
+constexpr int kBlock = 4;  // cells along a block's edge
 constexpr int kCorners = kBlock + 1;
 
 struct CellVertex {
@@ -177,20 +177,27 @@ TriangleMesh isosurface(const DistanceField& field, const Eigen::AlignedBox3d& b
 
   mesh.triangles.reserve(2 * quads.size());
   for (const auto& q : quads) {
-    const auto& v = mesh.vertices;
-    const double cut02 = std::max(least_angle_cos(v[q[0]], v[q[1]], v[q[2]]),
-                                  least_angle_cos(v[q[0]], v[q[2]], v[q[3]]));
-    const double cut13 = std::max(least_angle_cos(v[q[0]], v[q[1]], v[q[3]]),
-                                  least_angle_cos(v[q[1]], v[q[2]], v[q[3]]));
-    if (cut02 <= cut13) {
-      mesh.triangles.emplace_back(q[0], q[1], q[2]);
-      mesh.triangles.emplace_back(q[0], q[2], q[3]);
-    } else {
-      mesh.triangles.emplace_back(q[0], q[1], q[3]);
-      mesh.triangles.emplace_back(q[1], q[2], q[3]);
-    }
+    mesh.triangles.emplace_back(q[0], q[1], q[2]);
+    mesh.triangles.emplace_back(q[0], q[2], q[3]);
   }
+  recut_quads(mesh);
   return mesh;
+}
+
+void recut_quads(TriangleMesh& mesh) {
+  const auto& v = mesh.vertices;
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size() / 2, [&](std::size_t k) {
+    Vec3i &first = mesh.triangles[2 * k], &second = mesh.triangles[2 * k + 1];
+    // first is (q0, q1, q2), second (q0, q2, q3)
+    const int q0 = first[0], q1 = first[1], q2 = first[2], q3 = second[2];
+    const double cut02 =
+        std::max(least_angle_cos(v[q0], v[q1], v[q2]), least_angle_cos(v[q0], v[q2], v[q3]));
+    const double cut13 =
+        std::max(least_angle_cos(v[q1], v[q2], v[q3]), least_angle_cos(v[q1], v[q3], v[q0]));
+    if (cut13 >= cut02) return;
+    first = Vec3i(q1, q2, q3);
+    second = Vec3i(q1, q3, q0);
+  });
 }
 
 }  // namespace rugae

@@ -10,7 +10,7 @@ namespace rugae {
 /// Distance-like field in mm, negative inside, with its gradient; |gradient| at most
 /// `kSteepest` anywhere.
 using DistanceField = std::function<double(const Vec3& p, Vec3& gradient)>;
-inline constexpr double kSteepestField = 1.25;
+inline constexpr double kSteepestField = 1.1;
 
 /// The zero level of the field inside `box`, by surface nets (Gibson, Constrained elastic surface
 /// nets, MICCAI 1998) on a grid of `cell_mm`, then `rounds` of tangential relaxation, each followed
@@ -19,5 +19,9 @@ inline constexpr double kSteepestField = 1.25;
 /// at this cell size. About 3 A / cell^2 triangles for an area A.
 TriangleMesh isosurface(const DistanceField& field, const Eigen::AlignedBox3d& box, double cell_mm,
                         int rounds, const std::string& name);
+
+/// Cuts every quad of such a mesh (its triangles come in pairs) along the diagonal with the better
+/// angles: for after the vertices were moved.
+void recut_quads(TriangleMesh& mesh);
 
 }  // namespace rugae

@@ -22,7 +22,7 @@ constexpr float kTwigMm = 2.6f;      // vessels of the mucosa
 constexpr float kTreeHalfMm = 0.28f, kTwigHalfMm = 0.11f;  // half widths of the vessels
 
 constexpr float kLongSlope = 0.16f, kShortSlope = 0.13f;  // of the wet layer, for a unit gradient
-constexpr float kGradientMeanSquare = 0.45f;              // of a tile's gradient, per component
+constexpr float kGradientMeanSquare = 0.50f;              // of a tile's gradient, per component
 constexpr float kWaterF0 = 0.0207f;                       // ((n - 1) / (n + 1))^2 with n = 1.336
 constexpr float kOilF0 = 0.0362f;                         // n = 1.47
 
@@ -152,7 +152,9 @@ MucosaSample Mucosa::sample(const Vec3f& rest_position_mm, const Vec3f& normal, 
     // a line narrower than the pixel keeps its darkness times width
     const float half = std::max(half_mm, 0.5f * footprint_mm);
     const float t = std::max(0.0f, 1.0f - distance / (1.6f * half));
-    return depth * (half_mm / half) * t * t * (3.0f - 2.0f * t);
+    // closed loops, where the noise barely crosses zero, fade: vessels do not end in rings
+    const float drawn = smooth_step(0.35f, 0.8f, steep);
+    return drawn * depth * (half_mm / half) * t * t * (3.0f - 2.0f * t);
   };
   const float tree_depth = std::clamp(0.35f + 0.9f * blotch[1], 0.0f, 1.0f);
   float vessels = 0.0f;

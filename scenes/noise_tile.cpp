@@ -8,18 +8,20 @@
 namespace rugae {
 
 NoiseTile::NoiseTile(const std::function<Channels(const Vec3&)>& value, const Channels& range)
-    : voxels_(4u * kVoxels * kVoxels * kVoxels) {
+    : voxels_(std::size_t{4} * kRow * kVoxels * kVoxels) {
   constexpr float kLargest = 32767.0f;
-  for (int c = 0; c < 4; ++c) step_[c] = range[c] / kLargest;
+  for (int c = 0; c < 4; ++c) step_[c] = range[c] / (kLargest * kWeights);
   tbb::parallel_for(0, kVoxels, [&](int z) {
-    std::int16_t* out = voxels_.data() + 4 * kVoxels * kVoxels * z;
-    for (int y = 0; y < kVoxels; ++y)
-      for (int x = 0; x < kVoxels; ++x)
-        for (const float v : value(Vec3(x, y, z) * (static_cast<double>(kCells) / kVoxels))) {
-          const float r = range[(out - voxels_.data()) & 3];
-          *out++ =
-              static_cast<std::int16_t>(std::lround(std::clamp(v / r, -1.0f, 1.0f) * kLargest));
-        }
+    for (int y = 0; y < kVoxels; ++y) {
+      std::int16_t* row = voxels_.data() + 4 * kRow * (y + kVoxels * z);
+      for (int x = 0; x < kVoxels; ++x) {
+        const Channels v = value(Vec3(x, y, z) * (static_cast<double>(kCells) / kVoxels));
+        for (int c = 0; c < 4; ++c)
+          row[4 * x + c] = static_cast<std::int16_t>(
+              std::lround(std::clamp(v[c] / range[c], -1.0f, 1.0f) * kLargest));
+      }
+      std::copy(row, row + 4, row + 4 * kVoxels);
+    }
   });
 }
 

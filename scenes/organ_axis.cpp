@@ -1,5 +1,8 @@
 #include "scenes/organ_axis.h"
 
+#include <emmintrin.h>
+
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -24,8 +27,10 @@ T catmull_rom(const T& p0, const T& p1, const T& p2, const T& p3, double t) {
 }  // namespace
 
 struct OrganAxis::Weights {
-  std::array<double, kMaxBalls> value;  // weight, or distance before
-  std::array<double, kMaxBalls> from_centre_mm;
+  std::array<double, kMaxBalls + 1> value;  // distance, then weight of those near
+  std::array<double, kMaxBalls + 1> from_centre_mm;
+  std::array<int, kMaxBalls> near;
+  int count = 0;
   double sum = 0.0;
 };
 
@@ -71,24 +76,48 @@ OrganAxis::OrganAxis(const std::vector<AxisNode>& nodes, double step_mm, double 
   // Beside a straight row of balls of radius r, one every h, the sum of weights is near
   // sqrt(2 pi r k) / h: taking its logarithm off keeps the envelope at the radius asked for.
   const double h = step_sum / std::max(1, count - 1);
+  for (int i = 0; i < count; i += 2) {
+    Pair pair;
+    for (int lane = 0; lane < 2; ++lane) {
+      const bool real = i + lane < count;
+      const Ball& b = balls_[std::min(i + lane, count - 1)];
+      pair.x[lane] = real ? b.centre.x() : 1e9;
+      pair.y[lane] = b.centre.y() / depth;
+      pair.z[lane] = b.centre.z();
+      pair.radius[lane] = b.radius_mm;
+    }
+    pairs_.push_back(pair);
+  }
   double r_mean = 0.0;
   for (const Ball& b : balls_) r_mean += b.radius_mm / count;
   log_overlap_ = std::max(0.0, portable_log(std::sqrt(2.0 * 3.14159 * r_mean * softness_mm_) / h));
 }
 
 double OrganAxis::weigh(const Vec3& p, Weights& w) const {
-  const Vec3 scale(1.0, 1.0 / depth_, 1.0);
-  double least = 1e30;
-  for (std::size_t i = 0; i < balls_.size(); ++i) {
-    w.from_centre_mm[i] = (p - balls_[i].centre).cwiseProduct(scale).norm();
-    w.value[i] = w.from_centre_mm[i] - balls_[i].radius_mm;
-    least = std::min(least, w.value[i]);
+  const __m128d px = _mm_set1_pd(p.x()), py = _mm_set1_pd(p.y() / depth_), pz = _mm_set1_pd(p.z());
+  __m128d least2 = _mm_set1_pd(1e30);
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    const Pair& pair = pairs_[k];
+    const __m128d x = _mm_sub_pd(px, _mm_loadu_pd(pair.x)),
+                  y = _mm_sub_pd(py, _mm_loadu_pd(pair.y)),
+                  z = _mm_sub_pd(pz, _mm_loadu_pd(pair.z));
+    const __m128d from_centre =
+        _mm_sqrt_pd(_mm_add_pd(_mm_add_pd(_mm_mul_pd(x, x), _mm_mul_pd(y, y)), _mm_mul_pd(z, z)));
+    const __m128d distance = _mm_sub_pd(from_centre, _mm_loadu_pd(pair.radius));
+    least2 = _mm_min_pd(least2, distance);
+    _mm_storeu_pd(&w.from_centre_mm[2 * k], from_centre);
+    _mm_storeu_pd(&w.value[2 * k], distance);
   }
+  const double least =
+      std::min(_mm_cvtsd_f64(least2), _mm_cvtsd_f64(_mm_unpackhi_pd(least2, least2)));
   w.sum = 0.0;
+  w.count = 0;
   for (std::size_t i = 0; i < balls_.size(); ++i) {
     const double x = (least - w.value[i]) / softness_mm_;
-    w.value[i] = x > -kReach ? portable_exp(x) : 0.0;
+    if (!(x > -kReach)) continue;
+    w.value[i] = portable_exp(x);
     w.sum += w.value[i];
+    w.near[w.count++] = static_cast<int>(i);
   }
   // smooth minimum: -k ln sum exp(-d_i / k)
   return least - softness_mm_ * (portable_log(w.sum) - log_overlap_);
@@ -99,10 +128,11 @@ double OrganAxis::distance_mm(const Vec3& p, Vec3& gradient) const {
   const double distance = weigh(p, w);
   const Vec3 metric(1.0, 1.0 / (depth_ * depth_), 1.0);
   gradient.setZero();
-  for (std::size_t i = 0; i < balls_.size(); ++i)
-    if (w.value[i] > 0.0)
-      gradient += (w.value[i] / std::max(w.from_centre_mm[i], 1e-9)) *
-                  (p - balls_[i].centre).cwiseProduct(metric);
+  for (int n = 0; n < w.count; ++n) {
+    const int i = w.near[n];
+    gradient += (w.value[i] / std::max(w.from_centre_mm[i], 1e-9)) *
+                (p - balls_[i].centre).cwiseProduct(metric);
+  }
   gradient /= w.sum;
   return distance;
 }
@@ -112,8 +142,8 @@ AxisPoint OrganAxis::locate(const Vec3& p) const {
   AxisPoint result;
   result.distance_mm = weigh(p, w);
   const Vec3 metric(1.0, 1.0 / (depth_ * depth_), 1.0);
-  for (std::size_t i = 0; i < balls_.size(); ++i) {
-    if (!(w.value[i] > 0.0)) continue;
+  for (int n = 0; n < w.count; ++n) {
+    const int i = w.near[n];
     const double share = w.value[i] / w.sum;
     const Vec3 from_centre = p - balls_[i].centre;
     result.gradient +=
@@ -121,10 +151,13 @@ AxisPoint OrganAxis::locate(const Vec3& p) const {
     result.s_mm += share * balls_[i].s_mm;
     result.greater_mm += share * from_centre.dot(balls_[i].greater);
     result.side_mm += share * from_centre.dot(balls_[i].side);
+    result.greater += share * balls_[i].greater;
+    result.side += share * balls_[i].side;
   }
   result.cos_greater =
       result.greater_mm / std::max(1e-9, std::sqrt(result.greater_mm * result.greater_mm +
                                                    result.side_mm * result.side_mm));
+  result.along = result.side.cross(result.greater);
   return result;
 }
 

@@ -22,6 +22,8 @@ struct AxisPoint {
   double greater_mm = 0.0;   // across, towards the greater curvature
   double side_mm = 0.0;      // across, at right angles to it
   double cos_greater = 0.0;  // 1 on the greater curvature, -1 on the lesser
+  // The axis' own directions there: along it, towards the greater curvature, and to the side.
+  Vec3 along = Vec3::Zero(), greater = Vec3::Zero(), side = Vec3::Zero();
 };
 
 class OrganAxis {
@@ -46,10 +48,16 @@ class OrganAxis {
     Vec3 centre, greater, side;
     double radius_mm, s_mm;
   };
+  // The same centres (y over depth) and radii by pairs, for two lanes at once; an odd one is joined
+  // by a ball far away.
+  struct Pair {
+    double x[2], y[2], z[2], radius[2];
+  };
   struct Weights;
   double weigh(const Vec3& p, Weights& weights) const;
 
   std::vector<Ball> balls_;
+  std::vector<Pair> pairs_;
   std::vector<double> node_s_mm_;
   double softness_mm_, depth_, log_overlap_;
 };

@@ -12,11 +12,11 @@ namespace rugae {
 namespace {
 
 // A fold runs this many times farther along the organ than across before it turns or joins another.
-constexpr double kElongation = 5.0;
+constexpr double kElongation = 3.5;
 // Zero crossings of the fold noise lie this many cells apart across the folds (measured on the
 // noise).
-constexpr double kCellsPerFold = 0.62;
-constexpr double kMeanderMm = 5.0, kMeanderLengthMm = 45.0;
+constexpr double kCellsPerFold = 1.108;
+constexpr double kMeanderMm = 9.0, kMeanderLengthMm = 50.0;
 
 }  // namespace
 
@@ -58,12 +58,11 @@ double Relief::rugae_mm(const Vec3& p, const AxisPoint& at) const {
   if (!(share > 0.0) || !(options_.rugae_height_mm > 0.0)) return 0.0;
   const double cell = options_.rugae_spacing_mm / kCellsPerFold;
 
-  // meandering: the cross-section is shifted by a slow noise along the organ
-  const Vec3 slow = p / kMeanderLengthMm;
-  const double shift_a = kMeanderMm * gradient_noise(slow, bend_seed_).value;
-  const double shift_b = kMeanderMm * gradient_noise(slow, bend_seed_ + 1).value;
-  const double a = at.greater_mm, b = at.side_mm;
-  const Vec3 q((a + shift_a) / cell, (b + shift_b) / cell, at.s_mm / (cell * kElongation));
+  // meandering: the cross-section is shifted by slow noises
+  const NoiseSample shift_a = gradient_noise(p / kMeanderLengthMm, bend_seed_);
+  const NoiseSample shift_b = gradient_noise(p / kMeanderLengthMm, bend_seed_ + 1);
+  const Vec3 q((at.greater_mm + kMeanderMm * shift_a.value) / cell,
+               (at.side_mm + kMeanderMm * shift_b.value) / cell, at.s_mm / (cell * kElongation));
 
   // two noises turned against each other hide the lattice
   const Mat3 turn = (Mat3() << 0.8, -0.6, 0.0, 0.6, 0.8, 0.0, 0.0, 0.0, 1.0).finished();
@@ -72,13 +71,16 @@ double Relief::rugae_mm(const Vec3& p, const AxisPoint& at) const {
   const double n = n0.value + 0.8 * n1.value;
   const Vec3 g = n0.gradient + 0.8 * 1.21 * (turn.transpose() * n1.gradient);
 
-  // the derivative along the wall: around the organ, and along it
-  const double r = std::max(1.0, std::sqrt(a * a + b * b));
-  const double around = (-b * g.x() + a * g.y()) / (r * cell);
-  const double along = g.z() / (cell * kElongation);
+  // its gradient in space by the chain rule, and of that the part along the wall
+  constexpr double kShear = kMeanderMm / kMeanderLengthMm;
+  const Vec3 in_space =
+      (g.x() * (at.greater + kShear * shift_a.gradient) +
+       g.y() * (at.side + kShear * shift_b.gradient) + g.z() / kElongation * at.along) /
+      cell;
+  const Vec3 normal = at.gradient.normalized();
+  const double steep = (in_space - normal * normal.dot(in_space)).norm();
   constexpr double kLeastSlope = 0.35;  // in noise units a cell: limits the width of junctions
-  const double slope =
-      std::sqrt(around * around + along * along + kLeastSlope * kLeastSlope / (cell * cell));
+  const double slope = std::sqrt(steep * steep + kLeastSlope * kLeastSlope / (cell * cell));
   const double distance = std::abs(n) / slope;
 
   // soft-topped profile (1 - (d/w)^2)^2, half as high at d = w sqrt(1 - sqrt(1/2)) = 0.541 w
@@ -87,7 +89,10 @@ double Relief::rugae_mm(const Vec3& p, const AxisPoint& at) const {
   if (distance >= w) return 0.0;
   const double t = 1.0 - (distance / w) * (distance / w);
   const NoiseSample height = gradient_noise(p / 19.0, vary_seed_ + 1);
-  return options_.rugae_height_mm * share * std::min(1.0, 0.85 + 0.4 * height.value) * t * t;
+  // small closed lines, where the noise barely crosses zero, would be warts: they fade
+  const double drawn = smooth_step(0.35, 0.9, cell * steep);
+  return options_.rugae_height_mm * share * drawn * std::min(1.0, 0.85 + 0.4 * height.value) * t *
+         t;
 }
 
 // Furrows run where the two nearest feature points are equally far.

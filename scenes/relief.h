@@ -10,7 +10,7 @@
 namespace rugae {
 
 struct ReliefOptions {
-  double rugae_height_mm = 4.0;     // of the highest folds; 0: none
+  double rugae_height_mm = 3.5;     // of the highest folds; 0: none
   double rugae_thickness_mm = 4.0;  // at half height; folds are 3 to 5 mm thick
   double rugae_spacing_mm = 11.0;   // from fold to fold, on the greater curvature of the body
   double areae_size_mm = 3.0;       // areae gastricae: 1 to 5 mm

@@ -19,23 +19,23 @@ struct Station {
   double x, y, z, radius;
 };
 constexpr Station kAxis[] = {
-    {34, 10, 40, 43},      // 0 centre of the fundus' dome
-    {38, 9, 22, 47.5},     // 1
-    {37, 6, 0, 49},        // 2 level of the cardia
-    {33, 3, -24, 48},      // 3
-    {26, 0, -48, 45},      // 4 body
-    {14, -4, -70, 41},     // 5
-    {-6, -8, -87, 35},     // 6 below the incisura
-    {-29, -11, -94, 29},   // 7 antrum
-    {-51, -11, -90, 24},   // 8
-    {-67, -9, -78, 17.5},  // 9
-    {-79, -6, -66, 8.5},   // 10 pyloric canal
-    {-86, -4, -57, 7},     // 11
-    {-92, -2, -49, 9},     // 12 first centimetres of the duodenum, a blind stub
-    {-97, 0, -41, 10},     // 13
+    {36, 10, 38, 48.5},     // 0 centre of the fundus' dome
+    {40, 9, 20, 54},        // 1
+    {39, 6, 0, 55.5},       // 2 level of the cardia
+    {34, 3, -24, 54},       // 3
+    {27, 0, -48, 51},       // 4 body
+    {15, -4, -71, 46.5},    // 5
+    {-5, -8, -89, 40},      // 6 below the incisura
+    {-29, -11, -94, 33.5},  // 7 antrum
+    {-50, -11, -86, 28.5},  // 8
+    {-66, -9, -72, 20},     // 9
+    {-76, -6, -59, 9},      // 10 pyloric canal
+    {-82, -4, -49, 7},      // 11
+    {-88, -2, -41, 9},      // 12 first centimetres of the duodenum, a blind stub
+    {-93, 0, -34, 10},      // 13
 };
 constexpr Station kOesophagus[] = {
-    {4, 6, 14, 10}, {-12, 6, 30, 9.5}, {-22, 6, 43, 9}, {-29, 6, 56, 9}};
+    {0, 6, 12, 10}, {-18, 6, 30, 9.5}, {-29, 6, 44, 9}, {-36, 6, 58, 9}};
 constexpr std::size_t kCardiaNode = 2, kBodyNode = 4, kIncisuraNode = 6, kAntrumNode = 7,
                       kPylorusNode = 10, kDuodenumNode = 12;
 constexpr double kFlattening = 0.92;  // front to back, of a distended stomach; assumed
@@ -105,7 +105,7 @@ Region StomachShape::region(const Vec3& p, const AxisPoint& at) const {
   // the fundus is the dome above the level of the cardia
   if (at.s_mm < axis_.node_s_mm(kCardiaNode)) return Region::fundus;
   const double off_incisura = std::abs(at.s_mm - axis_.node_s_mm(kIncisuraNode));
-  if (at.cos_greater < -0.6 && off_incisura < 14.0 * scale_) return Region::incisura;
+  if (at.cos_greater < -0.7 && off_incisura < 12.0 * scale_) return Region::incisura;
   return at.s_mm < axis_.node_s_mm(kIncisuraNode) ? Region::body : Region::antrum;
 }
 
@@ -141,6 +141,7 @@ StomachWall make_stomach(const StomachOptions& options, std::uint64_t seed, doub
     wall.regions[v] = shape.region(p, at);
     vertices[v] = p - relief.height_mm(p, at) * gradient.normalized();
   });
+  recut_quads(wall.mesh);
   wall.mesh.normals = angle_weighted_normals(wall.mesh);
   return wall;
 }
