@@ -15,6 +15,7 @@ constexpr double kNegligiblePx = 0.01;  // a step that moves no corner further i
 constexpr int kCoarsestWidthPx = 80;
 constexpr int kHalvings = 4;
 constexpr double kMinOverlapPx = 100.0;
+constexpr double kMinTexture = 1e-8;  // squared gradient a pixel that fixes each parameter
 
 // x -> centred coordinates divided by half the width: the six parameters have one scale.
 struct Normalizer {
@@ -157,8 +158,9 @@ void descend(const PatchPair& pair, double px_per_px, double stop_mse, int max_i
     if (fit.mse < stop_mse) fit.converged = true;
     if (fit.converged || fit.iterations >= max_iterations) return;
     ++fit.iterations;
-    Vec6 step = cost.normal_matrix.ldlt().solve(-cost.gradient);
-    if (!step.allFinite()) return;  // no texture: nothing determines the affine
+    const Eigen::LDLT<Mat6> solver(cost.normal_matrix);
+    if (!(solver.vectorD().minCoeff() > kMinTexture * cost.overlap_px)) return;
+    Vec6 step = solver.solve(-cost.gradient);
     bool lowered = false;
     for (int halving = 0; halving <= kHalvings && !lowered; ++halving, step *= 0.5) {
       const Affine2 next = moved(fit.ref_from_mov, step, norm);
