@@ -33,6 +33,7 @@ OIIO::ImageSpec spec_of(const cv::Mat& image) {
   if (image.channels() == 2) spec.channelnames = {"x", "y"};
   if (image.channels() == 3) spec.channelnames = {"x", "y", "z"};
   spec.attribute("compression", kCompression);
+  spec.attribute("DateTime", "1970:01:01 00:00:00");  // otherwise the time of writing
   return spec;
 }
 
