@@ -19,6 +19,9 @@ constexpr double kLoopSizeSpread = 0.25;
 // far away, by this share of the whole turn.
 constexpr double kPatchDistanceMm = 30.0;
 constexpr double kFixation = 0.6;
+// The camera never looks farther than this from straight at the wall towards either end: down the
+// lumen the wall is far away and dark.
+constexpr double kMostAlongRad = rad_from_deg(40.0);
 // Sways along the axis are smaller than those around it.
 constexpr double kSwayAlong = 0.6;
 constexpr double kSteadyEnds = 0.8;
@@ -28,11 +31,12 @@ constexpr double kOutAndBack = 0.6;
 // Values of the random splines a cycle.
 constexpr double kValuesPerCycle = 2.0;
 
-/// A triangle wave with rounded corners: 0 at even v, 1 at odd v.
-double to_and_fro(double v) {
-  constexpr double kSharpness = 0.9;
-  return 0.5 - 0.5 * std::asin(kSharpness * std::cos(kPi * v)) / std::asin(kSharpness);
+/// A triangle wave with rounded corners: 0 at even v, 1 at odd v; a sharpness of 1 has corners.
+double to_and_fro(double v, double sharpness) {
+  return 0.5 - 0.5 * std::asin(sharpness * std::cos(kPi * v)) / std::asin(sharpness);
 }
+constexpr double kSharpnessAlong = 0.9;
+constexpr double kSharpnessRetracing = 0.99;
 
 /// A square wave with rounded edges: near 1 between 0 and 1, near -1 between 1 and 2.
 double out_or_back(double v) {
@@ -76,9 +80,9 @@ Course::Place Course::place(const CourseSize& size, double tau) const {
     const double x = tau * stations;
     progress = (x - kLinger * std::sin(2.0 * kPi * x) / (2.0 * kPi)) / stations;
   }
-  const double way = options_.retrace ? to_and_fro(2.0 * progress) : progress;
+  const double way = options_.retrace ? to_and_fro(2.0 * progress, kSharpnessRetracing) : progress;
   const double v = size.passes * (options_.retrace ? 0.5 : 1.0) * way;
-  double share = to_and_fro(v);
+  double share = to_and_fro(v, kSharpnessAlong);
   if (from_far_end_) share = 1.0 - share;
 
   Place at{};
@@ -131,9 +135,9 @@ Rigid3 Course::world_from_camera(const CourseSize& size, double tau) const {
   const ViewOptions& view = options_.view;
   const double around = at.around_rad + view.sway_rad * noise(sway_around_, tau) -
                         kFixation * at.shift_around_mm / kPatchDistanceMm;
-  const double along = 0.5 * kPi * view.look_ahead_share +
-                       kSwayAlong * view.sway_rad * noise(sway_along_, tau) -
-                       kFixation * at.shift_along_mm / kPatchDistanceMm;
+  const double wanted = view.tilt_rad + kSwayAlong * view.sway_rad * noise(sway_along_, tau) -
+                        kFixation * at.shift_along_mm / kPatchDistanceMm;
+  const double along = kMostAlongRad * std::tanh(wanted / kMostAlongRad);
   // The camera's axes in the tube's frame: z looks to the side and by `along` towards the far end;
   // the picture's up (-y) is the way to the far end, so that places seen again are seen upright
   // again.

@@ -11,9 +11,9 @@
 namespace rugae {
 namespace {
 
-// Grid points in the bounding box: steps of 3 mm in a stomach of 140 mm, fine enough to find its
+// Grid points in the bounding box: steps of 4 mm in a stomach of 140 mm, fine enough to find its
 // medial line, which is smoothed against the wall itself afterwards.
-constexpr double kGridPoints = 40000.0;
+constexpr double kGridPoints = 25000.0;
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
 struct Reached {
@@ -111,12 +111,11 @@ Vec3 FreeSpace::widest_point() const {
 
 double FreeSpace::widest_mm() const { return std::ranges::max(depth_mm_); }
 
-FreeSpace::Away FreeSpace::away(const Vec3& p) const {
-  const double depth = depth_mm(p);
+Vec3 FreeSpace::away_from_wall(const Vec3& p) const {
   const Vec3 v = p - wall_(p).point;
   const double length = v.norm();
-  const Vec3 direction = length > 0.0 ? Vec3(v / length) : Vec3::UnitZ();
-  return {depth, depth < 0.0 ? Vec3(-direction) : direction};
+  if (!(length > 0.0)) return Vec3::Zero();
+  return v / (depth_mm(p) < 0.0 ? -length : length);
 }
 
 std::vector<Vec3> resample(const std::vector<Vec3>& line, int count) {
@@ -165,9 +164,8 @@ std::vector<Vec3> FreeSpace::medial_line(double depth_mm, int count) const {
     line = std::move(next);
     if (round % kRoundsBetweenChecks != 0) continue;
     for (int i = 1; i + 1 < count; ++i) {
-      const Away from_wall = away(line[i]);
-      if (from_wall.depth_mm < depth_mm)
-        line[i] += (depth_mm - from_wall.depth_mm) * from_wall.direction;
+      const double depth = this->depth_mm(line[i]);
+      if (depth < depth_mm) line[i] += (depth_mm - depth) * away_from_wall(line[i]);
     }
     line = resample(line, count);
   }

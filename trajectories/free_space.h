@@ -18,12 +18,8 @@ class FreeSpace {
 
   /// Exact distance to the wall, mm; negative outside.
   double depth_mm(const Vec3& p) const { return -wall_.signed_distance_mm(p); }
-  /// Exact distance and the unit direction away from the wall.
-  struct Away {
-    double depth_mm;
-    Vec3 direction;
-  };
-  Away away(const Vec3& p) const;
+  /// The unit direction away from the closest point of the wall, inward; zero on the wall.
+  Vec3 away_from_wall(const Vec3& p) const;
 
   /// The roomiest grid point.
   Vec3 widest_point() const;

@@ -28,7 +28,7 @@ void read(YamlReader& yaml, TrajectoryOptions& options) {
     loops->finish();
   }
   if (auto view = yaml.child("view")) {
-    view->get("look_ahead_share", options.view.look_ahead_share);
+    view->get_deg("tilt_deg", options.view.tilt_rad);
     view->get_deg("sway_deg", options.view.sway_rad);
     view->get("sway_cycles", options.view.sway_cycles);
     view->finish();
@@ -84,7 +84,7 @@ void TrajectoryOptions::check(const std::string& where) const {
   in_range("offset_share", offset_share, 0.0, 0.9);
   in_range("loops.count", loops.count, 0, 1000);
   in_range("loops.per_station", loops.per_station, 1, 100);
-  in_range("view.look_ahead_share", view.look_ahead_share, 0.0, 0.9);
+  in_range("view.tilt_deg", deg_from_rad(view.tilt_rad), -40.0, 40.0);
   in_range("view.sway_deg", deg_from_rad(view.sway_rad), 0.0, 120.0);
   in_range("view.sway_cycles", view.sway_cycles, 0.0, 200.0);
   in_range("pace.peak_speed", pace.peak_speed, 1.0, 20.0);

@@ -175,6 +175,11 @@ PlannedPath plan_path(const TriangleMesh& wall, const TrajectoryOptions& options
         "trajectory '{}': the wall encloses a volume of {:.0f} mm^3; expected a closed mesh whose "
         "normals point outward",
         options.name, signed_volume_mm3(wall));
+  const EdgeReport edges = inspect_edges(wall);
+  check(edges.open == 0,
+        "trajectory '{}': the wall has {} open edges, expected a closed mesh: nothing else has an "
+        "inside",
+        options.name, edges.open);
   const FreeSpace space(wall);
   if (options.file.empty())
     return PlannedPath(std::make_shared<const PlannedPath::Impl>(plan_in(space, options, seed)));

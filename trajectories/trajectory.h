@@ -23,9 +23,9 @@ struct LoopOptions {
 
 /// Where the camera looks: obliquely at the wall, with slow sways to the sides.
 struct ViewOptions {
-  double look_ahead_share = 0.3;  // 0: straight at the wall, 1: along the stomach's axis
-  double sway_rad = 0.0;          // largest turn to the sides
-  double sway_cycles = 0.0;       // over the whole path
+  double tilt_rad = 0.4;     // from straight at the wall towards the far end
+  double sway_rad = 0.0;     // largest turn to the sides
+  double sway_cycles = 0.0;  // over the whole path
 };
 
 /// How the speed varies: a steady one, and bursts of `peak_speed` times the mean.
