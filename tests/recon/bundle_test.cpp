@@ -55,7 +55,7 @@ TEST(ReprojectionCost, IsTheProjectionOfTheCamera) {
   const auto& q = pose.rotation;
   const double block[7] = {q.x(), q.y(), q.z(), q.w(), 0.1, 0.2, 3.0};
   const double* parameters[] = {block, point.data()};
-  double r[2];
+  double r[2] = {};
   ASSERT_TRUE(ReprojectionCost(ray, 100.0).Evaluate(parameters, r, nullptr));
   EXPECT_NEAR(r[0], 100.0 * (p.x() / p.z() - 0.05), 1e-12);
   EXPECT_NEAR(r[1], 100.0 * (p.y() / p.z() - 0.02), 1e-12);
@@ -66,7 +66,7 @@ TEST(ReprojectionCost, RefusesPointsBehindTheCamera) {
   const double block[7] = {0, 0, 0, 1, 0, 0, 0};
   const double behind[3] = {0.1, 0.1, -1.0};
   const double* parameters[] = {block, behind};
-  double r[2];
+  double r[2] = {};
   EXPECT_FALSE(ReprojectionCost(Vec2::Zero(), 100.0).Evaluate(parameters, r, nullptr));
 }
 

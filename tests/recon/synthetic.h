@@ -22,7 +22,7 @@ struct Options {
   double noise_px = 0.0;       // standard deviation of each coordinate of an observation
   double outlier_share = 0.0;  // of observations moved by up to 40 px in each coordinate
   double unit = 1.0;           // length of the world's unit: 1000 gives the world in micrometres
-  Rigid3 moved;                // applied to the whole world, in its unit
+  Rigid3 moved = {};           // applied to the whole world, in its unit
   std::uint64_t seed = 1;
 };
 

@@ -1,0 +1,191 @@
+#include "recon/pictures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/files.h"
+#include "core/units.h"
+#include "dataset/image_io.h"
+#include "recon/keyframes.h"
+#include "recon/preprocess/reflections.h"
+
+namespace rugae {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kSubpixelBits = 4;  // of OpenCV's drawing: sixteenths of a pixel
+
+// A pixel position in OpenCV's integer-centre convention, fixed point.
+cv::Point drawn_at(const Vec2& px) {
+  constexpr double kUnit = 1 << kSubpixelBits;
+  return {static_cast<int>(std::lround((px.x() - 0.5) * kUnit)),
+          static_cast<int>(std::lround((px.y() - 0.5) * kUnit))};
+}
+
+cv::Mat hue_to_bgr(const cv::Mat& hsv) {
+  cv::Mat bgr;
+  cv::cvtColor(hsv, bgr, cv::COLOR_HSV2BGR);
+  return bgr;
+}
+
+// Hue of a quantity in [0, 1] from blue (0) to red (1).
+cv::Scalar ramp(double share) {
+  const cv::Mat hsv(1, 1, CV_8UC3,
+                    cv::Scalar(120.0 * (1.0 - std::clamp(share, 0.0, 1.0)), 220.0, 255.0));
+  const auto c = hue_to_bgr(hsv).at<cv::Vec3b>(0, 0);
+  return {static_cast<double>(c[0]), static_cast<double>(c[1]), static_cast<double>(c[2])};
+}
+
+fs::path stage(const fs::path& folder, const std::string& name) {
+  make_folder(folder / name);
+  return folder / name;
+}
+
+std::string name_of(int frame) { return fmt::format("{:06}.png", frame); }
+
+cv::Mat gray_as_bgr(const cv::Mat& gray) {
+  cv::Mat bgr;
+  cv::cvtColor(gray, bgr, cv::COLOR_GRAY2BGR);
+  return bgr;
+}
+
+}  // namespace
+
+std::vector<int> spread(int n, int count) {
+  std::vector<int> which;
+  for (int i = 0; i < count; ++i) {
+    const int at = static_cast<int>((i + 0.5) * n / count);
+    if (at < n && (which.empty() || which.back() != at)) which.push_back(at);
+  }
+  return which;
+}
+
+cv::Mat colour_of_flow(const cv::Mat& flow_px, double max_px) {
+  cv::Mat hsv(flow_px.size(), CV_8UC3);
+  for (int y = 0; y < flow_px.rows; ++y) {
+    for (int x = 0; x < flow_px.cols; ++x) {
+      const auto& f = flow_px.at<cv::Vec2f>(y, x);
+      const double length = std::hypot(f[0], f[1]);
+      if (!std::isfinite(length)) {
+        hsv.at<cv::Vec3b>(y, x) = {0, 0, 0};
+        continue;
+      }
+      const double hue = std::atan2(f[1], f[0]) / kPi * 90.0 + 90.0;  // OpenCV: 180 is a full turn
+      hsv.at<cv::Vec3b>(y, x) = {cv::saturate_cast<uchar>(std::fmod(hue, 180.0)),
+                                 cv::saturate_cast<uchar>(255.0 * length / max_px), 255};
+    }
+  }
+  return hue_to_bgr(hsv);
+}
+
+cv::Mat colour_of_depth(const cv::Mat& depth) {
+  std::vector<float> values;
+  for (int y = 0; y < depth.rows; ++y)
+    for (int x = 0; x < depth.cols; ++x)
+      if (std::isfinite(depth.at<float>(y, x))) values.push_back(depth.at<float>(y, x));
+  cv::Mat hsv(depth.size(), CV_8UC3, cv::Scalar::all(0));
+  if (values.empty()) return hsv;
+  const auto percentile = [&](double share) {
+    const auto at = values.begin() +
+                    static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+  };
+  const float low = percentile(0.02), high = std::max(percentile(0.98), low + 1e-9f);
+  for (int y = 0; y < depth.rows; ++y) {
+    for (int x = 0; x < depth.cols; ++x) {
+      const float d = depth.at<float>(y, x);
+      if (!std::isfinite(d)) continue;
+      const float near = 1.0f - std::clamp((d - low) / (high - low), 0.0f, 1.0f);
+      hsv.at<cv::Vec3b>(y, x) = {cv::saturate_cast<uchar>(120.0f * (1.0f - near)), 210, 255};
+    }
+  }
+  return hue_to_bgr(hsv);
+}
+
+void draw_preprocess(const fs::path& folder, const FrameSource& frames,
+                     const std::vector<int>& indices, const PreprocessOptions& options) {
+  const fs::path original = stage(folder, "original"), mask = stage(folder, "mask"),
+                 inpainted = stage(folder, "inpainted"), final = stage(folder, "preprocessed"),
+                 pose = stage(folder, "pose");
+  for (const int index : indices) {
+    const cv::Mat bgr = frames.observations().image(index);
+    cv::Mat gray;
+    cv::cvtColor(bgr, gray, cv::COLOR_BGR2GRAY);
+    const cv::Mat reflection = detect_reflections(gray, options.reflections);
+    const Frame frame = frames.frame(index);
+    write_image(original / name_of(index), bgr);
+    write_image(mask / name_of(index), reflection);
+    write_image(inpainted / name_of(index),
+                suppress_reflections(bgr, reflection, options.reflections));
+    write_image(final / name_of(index), frame.map_bgr);
+    write_image(pose / name_of(index), frame.gray);
+  }
+}
+
+void draw_pairs(const fs::path& folder, const FrameSource& frames,
+                const std::vector<PairAlignment>& pairs, const std::vector<int>& which) {
+  const fs::path flow_folder = stage(folder, "flow"), inlier_folder = stage(folder, "inliers");
+  for (const int p : which) {
+    const PairAlignment& pair = pairs[p];
+    const std::string name = fmt::format("{:06}-{:06}.png", pair.reference, pair.moving);
+    const cv::Mat reference = frames.gray(pair.reference);
+    const cv::Mat flow = farneback_flow(reference, frames.gray(pair.moving));
+    std::vector<double> lengths;
+    for (std::size_t i = 0; i < pair.reference_px.size(); ++i)
+      lengths.push_back((pair.moving_px[i] - pair.reference_px[i]).norm());
+    double max_px = 1.0;
+    for (const double length : lengths) max_px = std::max(max_px, length);
+    write_image(flow_folder / name, colour_of_flow(flow, max_px));
+    cv::Mat drawn = gray_as_bgr(reference);
+    for (std::size_t i = 0; i < lengths.size(); ++i) {
+      cv::line(drawn, drawn_at(pair.reference_px[i]), drawn_at(pair.moving_px[i]),
+               ramp(lengths[i] / max_px), 1, cv::LINE_AA, kSubpixelBits);
+      cv::circle(drawn, drawn_at(pair.reference_px[i]), 1 << kSubpixelBits, {255, 255, 255}, -1,
+                 cv::LINE_AA, kSubpixelBits);
+    }
+    write_image(inlier_folder / name, drawn);
+  }
+}
+
+void draw_tracks(const fs::path& folder, const FrameSource& frames, const Structure& structure,
+                 const std::vector<int>& keyframes) {
+  constexpr double kLongTrack = 12.0;  // key frames: drawn red
+  const fs::path to = stage(folder, "tracks");
+  for (const int k : keyframes) {
+    cv::Mat drawn = gray_as_bgr(frames.gray(structure.frames[k]));
+    for (const Track& track : structure.tracks) {
+      for (const auto& o : track.observations) {
+        if (o.keyframe != k) continue;
+        cv::circle(drawn, drawn_at(o.pixel), 2 << kSubpixelBits,
+                   ramp(static_cast<double>(track.observations.size()) / kLongTrack), -1,
+                   cv::LINE_AA, kSubpixelBits);
+      }
+    }
+    write_image(to / name_of(structure.frames[k]), drawn);
+  }
+}
+
+void draw_mosaics(const fs::path& folder, const std::vector<Mosaic>& mosaics,
+                  const std::vector<std::optional<MosaicDepth>>& depths, std::size_t at_most) {
+  const fs::path mosaic_folder = stage(folder, "mosaic"), seam_folder = stage(folder, "seams"),
+                 depth_folder = stage(folder, "depth");
+  for (const int m : spread(static_cast<int>(mosaics.size()), static_cast<int>(at_most))) {
+    const Mosaic& mosaic = mosaics[m];
+    const std::string name = fmt::format("{:03}.png", m);
+    write_image(mosaic_folder / name, mosaic.bgr);
+    cv::Mat drawn = mosaic.bgr.clone();
+    for (int y = 1; y < drawn.rows; ++y)
+      for (int x = 1; x < drawn.cols; ++x)
+        if (mosaic.seams.at<int>(y, x) != mosaic.seams.at<int>(y, x - 1) ||
+            mosaic.seams.at<int>(y, x) != mosaic.seams.at<int>(y - 1, x))
+          drawn.at<cv::Vec3b>(y, x) = {0, 255, 255};
+    write_image(seam_folder / name, drawn);
+    if (depths[m]) write_image(depth_folder / name, colour_of_depth(depths[m]->depth));
+  }
+}
+
+}  // namespace rugae

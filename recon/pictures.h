@@ -1,0 +1,38 @@
+#pragma once
+// Intermediates of the pipeline for people: pictures/<stage>/<name>.png.
+
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "recon/map.h"
+#include "recon/mosaic.h"
+#include "recon/preprocess/preprocess.h"
+#include "recon/structure.h"
+
+namespace rugae {
+
+/// Flow as colour: direction as hue, length as saturation (full at `max_px`; NaN is black).
+cv::Mat colour_of_flow(const cv::Mat& flow_px, double max_px);
+/// Depth as colour between its 2nd and 98th percentile; NaN is black.
+cv::Mat colour_of_depth(const cv::Mat& depth);
+
+/// Writes into <folder>/<stage>; every function takes what the stage made and nothing else.
+/// preprocess: original, mask, inpainted and final picture of some frames, the vignetting gain.
+void draw_preprocess(const std::filesystem::path& folder, const FrameSource& frames,
+                     const std::vector<int>& indices, const PreprocessOptions& options);
+/// flow and inliers: for some pairs, the flow and the correspondences over the reference frame.
+void draw_pairs(const std::filesystem::path& folder, const FrameSource& frames,
+                const std::vector<PairAlignment>& pairs, const std::vector<int>& which);
+/// tracks: the points of some key frames over them, coloured by the number of key frames that see
+/// them.
+void draw_tracks(const std::filesystem::path& folder, const FrameSource& frames,
+                 const Structure& structure, const std::vector<int>& keyframes);
+/// mosaic and depth: each mosaic, with the seams drawn in, and its depth.
+void draw_mosaics(const std::filesystem::path& folder, const std::vector<Mosaic>& mosaics,
+                  const std::vector<std::optional<MosaicDepth>>& depths, std::size_t at_most);
+
+/// `count` of 0 ... n-1, evenly spread, ascending, without repetition.
+std::vector<int> spread(int n, int count);
+
+}  // namespace rugae

@@ -1,0 +1,140 @@
+#include "recon/pipeline.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "core/check.h"
+#include "core/files.h"
+#include "dataset/image_io.h"
+#include "recon/keyframes.h"
+#include "recon/map.h"
+#include "recon/mosaic.h"
+#include "recon/pictures.h"
+#include "recon/resection.h"
+#include "recon/structure.h"
+#include "recon/tracks.h"
+
+namespace rugae {
+namespace {
+
+constexpr int kPictures = 6;          // of each stage
+constexpr int kDepthMapsAtOnce = 16;  // between two steps of the progress line
+
+std::vector<std::optional<MosaicDepth>> place_all(const std::vector<Mosaic>& mosaics,
+                                                  const Structure& structure, const Lens& lens,
+                                                  const ShadingOptions& options,
+                                                  Progress& progress) {
+  progress.begin("shape from shading", mosaics.size());
+  std::vector<std::optional<MosaicDepth>> depths;
+  for (const Mosaic& mosaic : mosaics) {
+    depths.push_back(place_mosaic(mosaic, structure, lens, options));
+    progress.step();
+  }
+  const auto placed = std::ranges::count_if(depths, [](const auto& d) { return d.has_value(); });
+  progress.end(fmt::format("{} of {} mosaics placed", placed, mosaics.size()));
+  return depths;
+}
+
+void write_depth(const EstimateLayout& layout, const TriangleMesh& map, const Structure& structure,
+                 const Lens& original_lens, Progress& progress) {
+  make_folder(layout.depth_folder());
+  std::vector<int> placed;
+  for (std::size_t k = 0; k < structure.frames.size(); ++k)
+    if (structure.placed[k]) placed.push_back(static_cast<int>(k));
+  progress.begin("depth of key frames", placed.size());
+  for (std::size_t begin = 0; begin < placed.size(); begin += kDepthMapsAtOnce) {
+    const std::size_t end = std::min(placed.size(), begin + kDepthMapsAtOnce);
+    tbb::parallel_for(begin, end, [&](std::size_t i) {
+      const int k = placed[i];
+      write_exr(layout.depth(structure.frames[k]),
+                keyframe_depth(map, structure.cam_from_world[k], original_lens));
+    });
+    progress.step(end - begin);
+  }
+  progress.end();
+}
+
+// What a reader of estimate.json wants to know of the run.
+Estimate estimate_of(const Observations& observations, const ReconOptions& options,
+                     const Structure& structure, const std::vector<std::optional<Rigid3>>& poses) {
+  Estimate e;
+  e.method = options.method;
+  e.options_json = to_json_text(options);
+  e.lens = observations.lens();
+  e.states.assign(poses.size(), FrameState::lost);
+  e.world_from_camera.assign(poses.size(), Rigid3{});
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    e.times_s.push_back(observations.time_s(static_cast<int>(i)));
+    if (!poses[i]) continue;
+    e.states[i] = FrameState::resected;
+    e.world_from_camera[i] = poses[i]->inverse();
+  }
+  for (std::size_t k = 0; k < structure.frames.size(); ++k)
+    if (structure.placed[k]) e.states[structure.frames[k]] = FrameState::keyframe;
+  std::size_t observed = 0;
+  for (const Track& track : structure.tracks) {
+    e.points.push_back(track.point);
+    observed += track.observations.size();
+  }
+  const double points = static_cast<double>(structure.tracks.size());
+  e.numbers = {{"keyframes", static_cast<double>(structure.frames.size())},
+               {"keyframes_placed", static_cast<double>(structure.placed_count())},
+               {"points", points},
+               {"mean_track_length", points > 0 ? static_cast<double>(observed) / points : 0.0},
+               {"mean_reprojection_px", structure.mean_reprojection_px},
+               {"bundle_iterations", static_cast<double>(structure.iterations)},
+               {"bundle_converged", structure.converged ? 1.0 : 0.0}};
+  return e;
+}
+
+}  // namespace
+
+Estimate reconstruct(const Observations& observations, const ReconOptions& options,
+                     const std::filesystem::path& out, Progress& progress) {
+  options.check();
+  const EstimateLayout layout{out};
+  make_folder(out);
+  progress.begin("preprocessing");
+  const FrameSource frames(observations, options.preprocess);                    // section 2.1
+  const Keyframes keys = select_keyframes(frames, options.keyframes, progress);  // algorithm 2
+  // Algorithm 3: steps 2 to 6, pairs; step 7, all poses jointly.
+  Followed followed =
+      follow_tracks(frames, keys, options.align, options.tracks, options.seed, progress);
+  const Structure structure = build_structure(keys.frames, std::move(followed.tracks),
+                                              frames.lens(), options.bundle, progress);
+  const auto poses =
+      resect_frames(frames, structure, options.align, options.bundle, options.seed, progress);
+  const auto usable = std::ranges::count_if(poses, [](const auto& p) { return p.has_value(); });
+  check(
+      usable >= 2,
+      "{}: {} usable frames of {}, expected at least 2: the others show too little texture, light "
+      "or common wall to be placed",
+      observations.name(), usable, observations.size());
+
+  progress.begin("mosaics");  // steps 8 to 10
+  const auto mosaics = compose_mosaics(frames, structure, followed.pairs, options.mosaic);
+  const auto depths = place_all(mosaics, structure, frames.lens(), options.shading, progress);
+  progress.begin("map");
+  Estimate estimate = estimate_of(observations, options, structure, poses);
+  estimate.map = fuse_map(mosaics, depths, structure, frames.lens(), options.map);
+  write_depth(layout, estimate.map, structure, observations.lens(), progress);
+  if (options.pictures) {
+    progress.begin("pictures");
+    const auto key_frames = spread(static_cast<int>(keys.frames.size()), kPictures);
+    draw_preprocess(layout.pictures(), frames, spread(frames.size(), kPictures),
+                    options.preprocess);
+    draw_pairs(layout.pictures(), frames, followed.pairs,
+               spread(static_cast<int>(followed.pairs.size()), kPictures));
+    draw_tracks(layout.pictures(), frames, structure, key_frames);
+    draw_mosaics(layout.pictures(), mosaics, depths, 2 * kPictures);
+  }
+  progress.end();
+  estimate.stages = progress.stages();
+  write_estimate(out, estimate);
+  return estimate;
+}
+
+}  // namespace rugae
