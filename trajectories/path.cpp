@@ -11,6 +11,8 @@ namespace rugae {
 namespace {
 
 constexpr double kCheckStepMm = 0.25;
+constexpr int kPositionBits = 30;  // behind the point: 1e-9 mm
+constexpr int kRotationBits = 40;  // 1e-12
 
 /// Slopes of the monotone cubic through (x_k, k): Fritsch and Carlson, SIAM J. Numer. Anal. 1980,
 /// doi:10.1137/0717021, with the harmonic means of Fritsch and Butland 1984, doi:10.1137/0905021.
@@ -44,7 +46,16 @@ PoseTrack sample_path(const PlannedPath& path, int frames, double fps) {
         "than 0",
         fps);
   PoseTrack track(frames);
-  for (int i = 0; i < frames; ++i) track[i] = {i / fps, path.world_from_camera(i / (frames - 1.0))};
+  // The last bits of a mathematics library's sines differ between processors; rounded poses do not.
+  const auto rounded = [](double value, int bits) {
+    return std::ldexp(std::nearbyint(std::ldexp(value, bits)), -bits);
+  };
+  for (int i = 0; i < frames; ++i) {
+    Rigid3 pose = path.world_from_camera(i / (frames - 1.0));
+    for (double& value : pose.translation) value = rounded(value, kPositionBits);
+    for (double& value : pose.rotation.coeffs()) value = rounded(value, kRotationBits);
+    track[i] = {i / fps, pose};
+  }
   return track;
 }
 
