@@ -1,6 +1,7 @@
 #include "validate/evaluate.h"
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "core/check.h"
@@ -13,6 +14,26 @@ namespace {
 
 using nlohmann::json;
 namespace fs = std::filesystem;
+
+// The tracked poses at the times of the truth: frames are the same by index, and must be so by
+// time.
+PoseTrack track_at_true_times(const Truth& truth, const Estimate& estimate,
+                              const fs::path& folder) {
+  check(static_cast<int>(estimate.states.size()) == truth.size(),
+        "{}: an estimate of {} frames, the dataset has {}", folder.string(), estimate.states.size(),
+        truth.size());
+  PoseTrack track;
+  for (int i = 0; i < truth.size(); ++i) {
+    const double time_s = truth.track()[i].time_s;
+    constexpr double kSameTime_s = 1e-6;
+    check(std::abs(estimate.times_s[i] - time_s) <= kSameTime_s,
+          "{}: frame {} is at {} s, in the dataset at {} s", folder.string(), i,
+          estimate.times_s[i], time_s);
+    if (estimate.states[i] != FrameState::lost)
+      track.push_back({time_s, estimate.world_from_camera[i]});
+  }
+  return track;
+}
 
 json tracking_json(const PoseErrors& poses, const Estimate& estimate) {
   const auto keyframes = std::ranges::count(estimate.states, FrameState::keyframe);
@@ -139,13 +160,11 @@ json surface_errors(const Estimate& estimate, const TriangleMesh& seen, const Po
 json evaluate(const fs::path& dataset, const fs::path& estimate_folder, Progress& progress) {
   const Truth truth = Truth::open(dataset);
   const Estimate estimate = read_estimate(estimate_folder);
-  check(static_cast<int>(estimate.states.size()) == truth.size(),
-        "{}: estimate of {} frames, the dataset {} has {}", estimate_folder.string(),
-        estimate.states.size(), dataset.string(), truth.size());
+  const PoseTrack track = track_at_true_times(truth, estimate, estimate_folder);
 
   json out;
   progress.begin("evaluate: path");
-  const PoseErrors poses = pose_errors(truth.track(), estimate.track());
+  const PoseErrors poses = pose_errors(truth.track(), track);
   out["trajectory"] = trajectory_json(poses);
   out["tracking"] = tracking_json(poses, estimate);
   out["alignment"] =

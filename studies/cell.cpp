@@ -1,0 +1,141 @@
+#include "studies/cell.h"
+
+#include "core/check.h"
+#include "core/files.h"
+#include "core/presets.h"
+#include "dataset/estimate.h"
+#include "dataset/layout.h"
+#include "dataset/observations.h"
+#include "recon/pipeline.h"
+#include "validate/evaluate.h"
+
+namespace rugae {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+// Raised when the same settings give other results, so that older ones are not taken for new.
+constexpr int kResultsVersion = 1;
+constexpr std::size_t kHashLetters = 10;
+
+std::string stem(const std::string& name_or_path) { return fs::path(name_or_path).stem().string(); }
+
+// A preset may build on another of its kind, so all of them count.
+std::string preset_hash(const std::string& kind, const std::string& what,
+                        const std::string& name_or_path) {
+  std::string hashes = sha256_of_file(find_preset(kind, what, name_or_path));
+  for (const std::string& name : preset_names(kind))
+    hashes += sha256_of_file(find_preset(kind, what, name));
+  return sha256_of_bytes(hashes);
+}
+
+// Everything the dataset is a function of.
+json dataset_key(const StudyOptions& study, const Cell& cell) {
+  const SimulateOptions& s = study.simulate;
+  return {{"version", kResultsVersion},
+          {"scene", preset_hash("scenes", "scene", s.scene)},
+          {"camera", preset_hash("cameras", "camera", cell.camera)},
+          {"trajectory", preset_hash("trajectories", "trajectory", cell.trajectory)},
+          {"resolution", s.resolution},
+          {"frames", s.frames},
+          {"seed", s.seed},
+          {"noise", s.noise},
+          {"vignetting", s.vignetting}};
+}
+
+std::string short_hash(const json& key) {
+  return sha256_of_bytes(key.dump()).substr(0, kHashLetters);
+}
+
+json simulation_json(const SimulateResult& r) {
+  return {{"frames", r.frames},
+          {"path_length_mm", r.path_length_mm},
+          {"min_clearance_mm", r.min_clearance_mm},
+          {"seconds", r.wall_s},
+          {"frames_per_s", r.wall_s > 0.0 ? json((r.frames - r.skipped) / r.wall_s) : json()},
+          {"trace_thread_s", r.trace_s},
+          {"shade_thread_s", r.shade_s},
+          {"label_thread_s", r.label_s},
+          {"sensor_thread_s", r.sensor_s},
+          {"encode_thread_s", r.encode_s},
+          {"write_thread_s", r.write_s}};
+}
+
+json read_json(const fs::path& file) {
+  try {
+    return json::parse(read_text(file));
+  } catch (const json::exception& error) {
+    fail("{}: not JSON: {}", file.string(), error.what());
+  }
+}
+
+// The dataset, from an earlier run where it is complete; returns what simulating measured.
+json make_dataset(const StudyOptions& study, const Cell& cell, const fs::path& dataset,
+                  Progress& progress) {
+  fs::path times = dataset;
+  times += ".json";
+  if (fs::exists(DatasetLayout{dataset}.manifest()) && fs::exists(times)) return read_json(times);
+  SimulateOptions options = study.simulate;
+  options.camera = cell.camera;
+  options.trajectory = cell.trajectory;
+  const json measured = simulation_json(simulate(options, dataset, progress));
+  write_atomic(times, measured.dump(2) + "\n");
+  return measured;
+}
+
+void make_estimate(const ReconOptions& options, const fs::path& dataset, const fs::path& estimate,
+                   Progress& progress) {
+  if (fs::exists(EstimateLayout{estimate}.info())) return;
+  fs::remove_all(estimate);  // what a killed run left: reconstruction has no middle to go on from
+  reconstruct(Observations::open(dataset), options, estimate, progress);
+}
+
+}  // namespace
+
+std::string Cell::name() const {
+  return fmt::format("{}_{}_{}", stem(camera), stem(trajectory), method);
+}
+
+std::string Cell::title() const {
+  return fmt::format("{}, trajectory {}, {}", stem(camera), stem(trajectory), method);
+}
+
+std::vector<Cell> cells_of(const StudyOptions& study) {
+  std::vector<Cell> cells;
+  for (const std::string& camera : study.cameras)
+    for (const std::string& trajectory : study.trajectories)
+      for (const std::string& method : study.methods) cells.push_back({camera, trajectory, method});
+  return cells;
+}
+
+CellResult run_cell(const StudyOptions& study, const Cell& cell, const fs::path& out,
+                    Progress& progress) {
+  for (const char* folder : {"datasets", "estimates", "metrics"}) make_folder(out / folder);
+  ReconOptions recon = study.recon;
+  recon.method = cell.method;
+  const json data_key = dataset_key(study, cell);
+  const std::string data_hash = short_hash(data_key);
+  const std::string hash = short_hash({{"dataset", data_key}, {"recon", to_json_text(recon)}});
+
+  CellResult result;
+  result.cell = cell;
+  result.dataset = out / "datasets" /
+                   fmt::format("{}_{}_{}", stem(cell.camera), stem(cell.trajectory), data_hash);
+  result.estimate = out / "estimates" / fmt::format("{}_{}", cell.name(), hash);
+  const fs::path metrics = out / "metrics" / fmt::format("{}_{}.json", cell.name(), hash);
+  result.kept = fs::exists(metrics) && fs::exists(EstimateLayout{result.estimate}.info()) &&
+                fs::exists(DatasetLayout{result.dataset}.manifest());
+  if (result.kept) {
+    result.metrics = read_json(metrics);
+    return result;
+  }
+  const json simulation = make_dataset(study, cell, result.dataset, progress);
+  make_estimate(recon, result.dataset, result.estimate, progress);
+  result.metrics = evaluate(result.dataset, result.estimate, progress);
+  result.metrics["simulation"] = simulation;
+  write_atomic(metrics, result.metrics.dump(1) + "\n");
+  return result;
+}
+
+}  // namespace rugae

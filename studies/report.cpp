@@ -1,0 +1,163 @@
+#include "studies/report.h"
+
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "core/files.h"
+#include "core/presets.h"
+#include "studies/html.h"
+#include "studies/paper_numbers.h"
+#include "studies/report_parts.h"
+
+namespace rugae {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+std::string stem(const std::string& name_or_path) { return fs::path(name_or_path).stem().string(); }
+
+// Fills {{name}} in the template; every name must be there, and every placeholder be filled.
+std::string filled(std::string page, const std::map<std::string, std::string>& values,
+                   const fs::path& file) {
+  std::string out;
+  std::size_t from = 0;
+  for (std::size_t open = page.find("{{"); open != std::string::npos;
+       open = page.find("{{", from)) {
+    const std::size_t close = page.find("}}", open);
+    check(close != std::string::npos, "{}: a placeholder without end", file.string());
+    const std::string name = page.substr(open + 2, close - open - 2);
+    const auto it = values.find(name);
+    check(it != values.end(), "{}: unknown placeholder '{}'", file.string(), name);
+    out.append(page, from, open - from);
+    out += it->second;
+    from = close + 2;
+  }
+  out.append(page, from);
+  return out;
+}
+
+std::string lede(const ReportInput& input, const CellView& first) {
+  const json& m = first.cell.metrics;
+  const Lens& lens = first.truth.camera().lens;
+  const std::string scene = html::escape(stem(input.study.simulate.scene));
+  if (input.cells.size() == 1)
+    return fmt::format(
+        "{} frames of {} &times; {} px from a capsule camera (<b>{}</b>) on <b>trajectory {}</b>, "
+        "{} cm through a simulated stomach (<b>{}</b>, {}, seed {}). The <b>{}</b> method "
+        "reconstructed the path and the wall from the frames alone; here both are measured against "
+        "the exact truth.",
+        first.truth.size(), lens.width, lens.height,
+        html::escape(paper_camera(stem(first.cell.cell.camera))),
+        html::escape(stem(first.cell.cell.trajectory)),
+        html::number(m.at("trajectory").at("path_length_mm").get<double>() / 10.0, 4), scene,
+        html::escape(input.study.simulate.resolution), input.study.simulate.seed,
+        html::escape(first.cell.cell.method));
+  return fmt::format(
+      "{} cells: every combination of {} camera{}, {} trajectories and {} method{} in a simulated "
+      "stomach (<b>{}</b>, {}, seed {}), each reconstructed from its frames alone and measured "
+      "against the exact truth.",
+      input.cells.size(), input.study.cameras.size(), input.study.cameras.size() == 1 ? "" : "s",
+      input.study.trajectories.size(), input.study.methods.size(),
+      input.study.methods.size() == 1 ? "" : "s", scene,
+      html::escape(input.study.simulate.resolution), input.study.simulate.seed);
+}
+
+std::string gates_part(const std::vector<GateOutcome>& gates) {
+  if (gates.empty()) return {};
+  html::Table table;
+  table.head = {"Gate", "expected", "found", "", "why"};
+  for (const GateOutcome& gate : gates)
+    table.rows.push_back(
+        {html::escape(gate.cell) + "<br><code>" + html::escape(gate.metric) + "</code>",
+         html::escape(gate.expected), html::escape(gate.found),
+         gate.passed ? "<b class=\"pass\">passed</b>" : "<b class=\"fail\">failed</b>",
+         html::escape(gate.reason)});
+  return "<section class=\"chapter\"><h2>Gates</h2>" + table.str() + "</section>\n";
+}
+
+// All cells side by side; the paper's numbers in small print.
+std::string overview_part(const std::vector<CellResult>& cells) {
+  html::Table table;
+  table.head = {"Camera",         "trajectory", "method",  "ATE RMSE (mm)", "paper",
+                "map error (mm)", "paper",      "tracked", "seconds"};
+  for (const CellResult& cell : cells) {
+    const auto at = [&](const std::string& path) {
+      const json& value = metric_at(cell.metrics, path);
+      return value.is_number() ? value.get<double>() : std::nan("");
+    };
+    const PaperNumbers paper = paper_numbers(cell.cell.camera, cell.cell.trajectory);
+    const auto of_paper = [](const std::optional<double>& v) {
+      return "<small>" + (v ? html::number(*v) : std::string("&ndash;")) + "</small>";
+    };
+    table.rows.push_back(
+        {fmt::format("<a href=\"#{}\">{}</a>", html::escape(cell.cell.name()),
+                     html::escape(paper_camera(stem(cell.cell.camera)))),
+         html::escape(stem(cell.cell.trajectory)), html::escape(cell.cell.method),
+         html::number(at("trajectory.ate_sim3_rmse_mm")), of_paper(paper.ate_rmse_mm),
+         html::number(at("surface.icp_aligned.accuracy_mean_mm")), of_paper(paper.map_mean_mm),
+         html::number(100.0 * at("tracking.tracked_share")) + " %",
+         html::number(at("time.reconstruct_s"))});
+  }
+  return "<section class=\"chapter\"><h2>All cells</h2>" + table.str() + "</section>\n";
+}
+
+std::string chapter(const std::string& title, const std::string& intro, const std::string& body) {
+  if (body.empty()) return {};
+  return "<section class=\"chapter\"><h2>" + title + "</h2><p class=\"intro\">" + intro + "</p>\n" +
+         body + "</section>\n";
+}
+
+std::string cell_chapters(const CellView& view) {
+  return chapter("Inside the stomach",
+                 "Frames along the path, and what the simulator knows about every pixel of them. "
+                 "The reconstruction gets the first row alone. Click a picture to enlarge it.",
+                 frames_part(view)) +
+         chapter("From frames to a map", "What each stage of the reconstruction made of them.",
+                 stages_part(view)) +
+         chapter("The path", "Where the capsule was, and where the reconstruction thinks it was.",
+                 path_part(view)) +
+         chapter("The map", "The reconstructed wall, placed by the path, beside the true one.",
+                 map_part(view)) +
+         chapter("All numbers", "Dashes stand for what could not be measured.", tables_part(view));
+}
+
+std::string cells_part(const ReportInput& input, std::string& head_cards, std::string& cover,
+                       std::string& lede_text) {
+  std::string out;
+  const bool many = input.cells.size() > 1;
+  for (const CellResult& cell : input.cells) {
+    const Truth truth = Truth::open(cell.dataset);
+    const Estimate estimate = read_estimate(cell.estimate);
+    const CellView view{cell, truth, estimate, many};
+    if (out.empty()) {
+      cover = cover_picture(view);
+      lede_text = lede(input, view);
+      if (!many) head_cards = headline_cards(view);
+    }
+    if (!many) return cell_chapters(view);
+    out += fmt::format("<details class=\"cell\" id=\"{}\"><summary>{}</summary>\n",
+                       html::escape(cell.cell.name()), html::escape(cell.cell.title())) +
+           headline_cards(view) + cell_chapters(view) + "</details>\n";
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string report_html(const ReportInput& input) {
+  check(!input.cells.empty(), "report: a study without cells");
+  const fs::path file = preset_root() / "viewer" / "report.html";
+  const std::string page = read_text(file);
+  std::map<std::string, std::string> values;
+  values["title"] = html::escape(input.study.title);
+  values["cells"] = cells_part(input, values["cards"], values["cover"], values["lede"]);
+  values["overview"] = input.cells.size() > 1 ? overview_part(input.cells) : "";
+  values["gates"] = gates_part(input.gates);
+  values["study"] = html::escape(input.study_text);
+  return filled(page, values, file);
+}
+
+}  // namespace rugae

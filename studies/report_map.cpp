@@ -1,0 +1,122 @@
+// The map over the true wall.
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "render/shaded_view.h"
+#include "studies/colours.h"
+#include "studies/html.h"
+#include "studies/plots.h"
+#include "studies/report_parts.h"
+#include "validate/align.h"
+#include "validate/metrics_json.h"
+#include "validate/surface_error.h"
+#include "validate/visibility.h"
+
+namespace rugae {
+namespace {
+
+constexpr int kWidth_px = 620, kHeight_px = 560;
+const Vec3f kSeen_srgb(0.86f, 0.55f, 0.47f), kUnseen_srgb(0.58f, 0.60f, 0.64f);
+
+// From at most this many frames, in equal steps: enough for a picture of what was seen.
+Visibility visibility_of(const Truth& truth) {
+  constexpr int kMostFrames = 150;
+  Visibility visibility(truth.wall(), {});
+  const int step = (truth.size() + kMostFrames - 1) / kMostFrames;
+  for (int i = 0; i < truth.size(); i += step)
+    visibility.add(truth.camera().lens, truth.track()[i].world_from_camera, truth.depth_mm(i));
+  return visibility;
+}
+
+TriangleMesh wall_with_seen_part(const TriangleMesh& wall, const Visibility& visibility) {
+  TriangleMesh coloured = wall;
+  coloured.colors.assign(wall.vertices.size(), kUnseen_srgb);
+  for (std::size_t t = 0; t < wall.triangles.size(); ++t)
+    if (visibility.seen()[t] > 0)
+      for (const int v : wall.triangles[t]) coloured.colors[v] = kSeen_srgb;
+  if (coloured.normals.empty()) coloured.normals = angle_weighted_normals(coloured);
+  return coloured;
+}
+
+TriangleMesh coloured_by_error(const TriangleMesh& map, const std::vector<double>& error_mm,
+                               double worst_mm) {
+  TriangleMesh coloured = map;
+  coloured.colors.resize(map.vertices.size());
+  for (std::size_t v = 0; v < map.vertices.size(); ++v)
+    coloured.colors[v] = error_colour(error_mm[v] / worst_mm);
+  if (coloured.normals.empty()) coloured.normals = angle_weighted_normals(coloured);
+  return coloured;
+}
+
+std::string picture(const TriangleMesh& mesh, const Eigen::AlignedBox3d& box, const Side& side,
+                    bool look_inside, const std::string& alt, const std::string& caption) {
+  const Lens lens = picture_lens(kWidth_px, kHeight_px);
+  ShadedViewOptions options;
+  options.cull_front = look_inside;
+  const cv::Mat image =
+      shaded_view(mesh, view_of_box(box, side.from, side.up, lens), lens, options);
+  return html::figure(html::jpeg(image, kWidth_px, 88), alt + ", " + side.name, caption);
+}
+
+}  // namespace
+
+std::string map_part(const CellView& view) {
+  const Truth& truth = view.truth;
+  const Visibility visibility = visibility_of(truth);
+  const TriangleMesh wall = wall_with_seen_part(truth.wall(), visibility);
+  const Eigen::AlignedBox3d box = bounding_box(wall);
+  const auto to_truth = transform_from_json(view.cell.metrics.at("alignment"));
+  std::string out;
+  const std::string note = view.cell.metrics.at("surface").at("note");
+  if (!note.empty()) out += "<p class=\"note\">" + html::escape(note) + "</p>";
+
+  TriangleMesh map, errors;
+  double worst_mm = 1.0;
+  const bool has_map = to_truth && !view.estimate.map.empty() && !visibility.seen_wall().empty();
+  if (has_map) {
+    map = transformed(view.estimate.map, *to_truth);
+    if (map.normals.empty()) map.normals = angle_weighted_normals(map);
+    const std::vector<double> error_mm = distances_mm(map.vertices, visibility.seen_wall());
+    std::vector<double> sorted = error_mm;
+    std::ranges::sort(sorted);
+    constexpr double kMost = 0.95;
+    const double high = sorted[static_cast<std::size_t>(kMost * (sorted.size() - 1.0))];
+    const double step = nice_step(std::max(high, 1e-6), 4);
+    worst_mm = step * std::max(1.0, std::ceil(high / step));
+    errors = coloured_by_error(map, error_mm, worst_mm);
+  }
+  out += fmt::format("<div class=\"maps\" style=\"--columns:{}\">", has_map ? 3 : 1);
+  for (const Side& side : two_sides()) {
+    out += picture(wall, box, side, true, "true wall",
+                   fmt::format("The true wall, {}, looking in through the near side. Rose: seen by "
+                               "the capsule; gray: never seen.",
+                               side.name));
+    if (!has_map) continue;
+    out += picture(map, box, side, false, "reconstructed map",
+                   fmt::format("The reconstructed map in its own colours, same view and scale."));
+    out += picture(errors, box, side, false, "map coloured by error",
+                   "The map coloured by its distance to the wall that was seen.");
+  }
+  out += "</div>\n";
+  if (!has_map) return out;
+  out += fmt::format(
+      "<div class=\"legend\">distance to the true wall: 0 <span class=\"bar inline\" "
+      "style=\"background:{}\"></span> {:g} mm and more</div>\n",
+      error_gradient_css(), worst_mm);
+
+  constexpr std::size_t kSamples = 20'000;
+  const TriangleMesh seen = visibility.seen_wall();
+  const auto of_map = distances_mm(sample_surface(map, kSamples), seen);
+  const auto of_wall = distances_mm(sample_surface(seen, kSamples), map);
+  out += "<figure class=\"half\">" +
+         cumulative_svg({{"map", "a", of_map}, {"wall", "b", of_wall}}, 2.0 * worst_mm) +
+         "<figcaption><span class=\"line a\"></span>share of the map within a distance of the seen "
+         "wall (accuracy) <span class=\"line b\"></span>share of the seen wall within a distance "
+         "of the map (completeness)</figcaption></figure>\n";
+  return out;
+}
+
+}  // namespace rugae

@@ -1,0 +1,37 @@
+#pragma once
+// The parts of a cell's chapter in the report; each returns HTML.
+
+#include <string>
+
+#include "core/sim3.h"
+#include "dataset/estimate.h"
+#include "dataset/truth.h"
+#include "studies/cell.h"
+
+namespace rugae {
+
+/// What the parts look at.
+struct CellView {
+  const CellResult& cell;
+  const Truth& truth;
+  const Estimate& estimate;
+  bool many_cells = false;  // fewer and smaller pictures, so that the page stays small
+};
+
+/// The numbers a reader looks for first, the paper's beside them.
+std::string headline_cards(const CellView& view);
+/// Frames with their labels, in a grid.
+std::string frames_part(const CellView& view);
+/// The pictures the reconstruction left of its stages.
+std::string stages_part(const CellView& view);
+/// The estimated path over the true one, and its error over time.
+std::string path_part(const CellView& view);
+/// The map beside the wall, coloured by its error.
+std::string map_part(const CellView& view);
+/// Every metric.
+std::string tables_part(const CellView& view);
+
+/// A frame of the dataset for the head of the page, as data URI.
+std::string cover_picture(const CellView& view);
+
+}  // namespace rugae
