@@ -131,13 +131,12 @@ double median_magnitude(std::vector<double> values) {
 }
 
 /// Iteratively reweighted least squares; the last weights are left in `weights`.
-bool solve_robustly(const std::vector<FieldSample>& samples, double penalty, DepthField& field,
-                    std::vector<double>& weights) {
+bool solve_robustly(const std::vector<FieldSample>& samples, double penalty, double min_sigma,
+                    DepthField& field, std::vector<double>& weights) {
   for (int round = 0; round < kReweightings; ++round) {
     if (!solve(samples, weights, penalty, field)) return false;
     find_residuals(samples, field);
-    // Exact samples leave nothing to weigh: the spread is kept above rounding.
-    field.sigma = std::max(kMadToSigma * median_magnitude(field.residuals), 1e-12);
+    field.sigma = std::max(kMadToSigma * median_magnitude(field.residuals), min_sigma);
     for (std::size_t s = 0; s < samples.size(); ++s) {
       const double r = field.residuals[s] / (kCauchy * field.sigma);
       weights[s] = samples[s].weight / (1.0 + r * r);
@@ -171,7 +170,7 @@ double DepthField::spline(const Vec2& pixel) const {
 }
 
 std::optional<DepthField> fit_depth_field(const std::vector<FieldSample>& samples, cv::Size size,
-                                          double spacing_px) {
+                                          double spacing_px, double min_sigma) {
   if (samples.size() < kMinSamples || on_a_line(samples)) return std::nullopt;
   DepthField field;
   field.spacing_px = spacing_px;
@@ -180,7 +179,7 @@ std::optional<DepthField> fit_depth_field(const std::vector<FieldSample>& sample
 
   std::vector<double> weights;
   for (const FieldSample& sample : samples) weights.push_back(sample.weight);
-  if (!solve_robustly(samples, kFirstPenalty, field, weights)) return std::nullopt;
+  if (!solve_robustly(samples, kFirstPenalty, min_sigma, field, weights)) return std::nullopt;
 
   // Every fifth sample, by their order, is left out; wrong ones were unmasked above and the mean
   // over the rest is weighted accordingly.
@@ -199,7 +198,7 @@ std::optional<DepthField> fit_depth_field(const std::vector<FieldSample>& sample
     if (total > 0.0 && error / total < best_error)
       best_error = error / total, best_penalty = penalty;
   }
-  if (!solve_robustly(samples, best_penalty, field, weights)) return std::nullopt;
+  if (!solve_robustly(samples, best_penalty, min_sigma, field, weights)) return std::nullopt;
   field.held_out = best_error;
   for (const double residual : field.residuals)
     field.kept.push_back(std::abs(residual) <= kKeptSigmas * field.sigma);

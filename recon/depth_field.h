@@ -33,8 +33,8 @@ struct DepthField {
 
 /// Least squares with a thin-plate penalty whose strength is chosen by leaving out every fifth
 /// sample, and with Cauchy weights, so that wrong samples lose their say. Empty with fewer than 12
-/// samples or when they lie on a line.
+/// samples or when they lie on a line. Residuals below `min_sigma` are never held against a sample.
 std::optional<DepthField> fit_depth_field(const std::vector<FieldSample>& samples, cv::Size size,
-                                          double spacing_px);
+                                          double spacing_px, double min_sigma);
 
 }  // namespace rugae

@@ -53,11 +53,12 @@ View to_view(const Mosaic& mosaic, const MosaicDepth& placed, const Lens& lens) 
             lens.cy - mosaic.origin_px.y() - 0.5};
   if (!is_pinhole(lens)) {
     // Frames kept with their distortion: each pinhole pixel takes from where the lens images it.
+    const LensProjector projector(lens);
     cv::Mat source(placed.depth.size(), CV_32FC2, cv::Scalar::all(-1.0));
     for (int y = 0; y < source.rows; ++y)
       for (int x = 0; x < source.cols; ++x) {
         const auto pixel =
-            lens.project(Vec3((x - view.cx) / view.fx, (y - view.cy) / view.fy, 1.0));
+            projector.project(Vec3((x - view.cx) / view.fx, (y - view.cy) / view.fy, 1.0));
         if (!pixel) continue;
         const Vec2 from = *pixel - mosaic.origin_px - Vec2(0.5, 0.5);
         source.at<cv::Vec2f>(y, x) = {static_cast<float>(from.x()), static_cast<float>(from.y())};

@@ -184,13 +184,24 @@ std::vector<MosaicPlan> plan_mosaics(const Structure& structure,
     covered[k] = false;
     candidates[k] = reachable(structure, graph, k, lens, options);
   }
+  // Of anchors that bring equally many, the most central one: its members turn least in total.
+  const auto total_turn = [&](int anchor) {
+    double total = 0.0;
+    for (const MosaicMember& member : candidates[anchor])
+      total += angle_between_rad(structure.cam_from_world[anchor].rotation,
+                                 structure.cam_from_world[member.keyframe].rotation);
+    return total;
+  };
   std::vector<MosaicPlan> plans;
   while (true) {
     int best = -1, best_gain = 0;
+    double best_turn = 0.0;
     for (int k = 0; k < count; ++k) {
       int gain = 0;
       for (const MosaicMember& member : candidates[k]) gain += covered[member.keyframe] ? 0 : 1;
-      if (gain > best_gain) best = k, best_gain = gain;
+      if (gain == 0 || gain < best_gain) continue;
+      const double turn = total_turn(k);
+      if (gain > best_gain || turn < best_turn) best = k, best_gain = gain, best_turn = turn;
     }
     if (best < 0) return plans;
     MosaicPlan plan{best, candidates[best]};

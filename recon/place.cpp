@@ -24,6 +24,8 @@ constexpr float kMaxReliefSlope = 2.0f;
 /// Depth ends this many typical point distances away from the nearest point.
 constexpr double kReachInSpacings = 2.5;
 constexpr double kMinReachPx = 8.0, kMaxReachPx = 48.0;  // at 640 px width
+/// Points nearer to the field than this share of their depth are never called wrong.
+constexpr double kMinSpread = 1e-4;
 /// A point the anchor itself saw is not behind a fold; others may be.
 constexpr double kUnseenByAnchorWeight = 0.3;
 /// A wall seen more obliquely than this (80 degrees) is a fold's edge bridged by the smooth part.
@@ -59,6 +61,7 @@ std::vector<SparsePoint> points_in(const Mosaic& mosaic, const Structure& struct
   std::vector<bool> member(structure.frames.size(), false);
   for (const int k : mosaic.members) member[k] = true;
   const Rigid3& anchor_from_world = structure.cam_from_world[mosaic.anchor];
+  const LensProjector projector(lens);
   std::vector<SparsePoint> points;
   for (const Track& track : structure.tracks) {
     if (!track.triangulated) continue;
@@ -69,7 +72,7 @@ std::vector<SparsePoint> points_in(const Mosaic& mosaic, const Structure& struct
     }
     if (!seen) continue;
     const Vec3 p_anchor = anchor_from_world * track.point;
-    const auto on_anchor = lens.project(p_anchor);
+    const auto on_anchor = projector.project(p_anchor);
     if (!on_anchor) continue;
     const Vec2 pixel = *on_anchor - mosaic.origin_px;
     const int x = static_cast<int>(std::floor(pixel.x()));
@@ -95,11 +98,12 @@ cv::Mat out_of_reach(const std::vector<SparsePoint>& points, const std::vector<b
 
 /// Clears depths where the surface through the neighbours is seen at a grazing angle.
 void drop_grazing(const Mosaic& mosaic, const Lens& lens, cv::Mat& depth) {
+  const LensProjector projector(lens);
   const cv::Mat before = depth.clone();
   const auto point = [&](int y, int x) -> std::optional<Vec3> {
     const float z = before.at<float>(y, x);
     if (!(z > 0.0f)) return std::nullopt;
-    const auto ray = lens.unproject(mosaic.origin_px + Vec2(x + 0.5, y + 0.5));
+    const auto ray = projector.unproject(mosaic.origin_px + Vec2(x + 0.5, y + 0.5));
     if (!ray) return std::nullopt;
     return Vec3(*ray * (z / ray->z()));
   };
@@ -156,7 +160,7 @@ std::optional<MosaicDepth> place_mosaic(const Mosaic& mosaic, const Structure& s
         relief.at<float>(static_cast<int>(point.pixel.y()), static_cast<int>(point.pixel.x()));
     samples.push_back({point.pixel, std::log(point.depth), ingredient, point.weight});
   }
-  const auto field = fit_depth_field(samples, mosaic.valid.size(), spacing_px);
+  const auto field = fit_depth_field(samples, mosaic.valid.size(), spacing_px, kMinSpread);
   if (!field) return std::nullopt;
 
   placed.depth = cv::Mat(mosaic.valid.size(), CV_32F);

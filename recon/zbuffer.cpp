@@ -36,23 +36,37 @@ double hit(const Vec3& ray, const Vec3& a, const Vec3& ab, const Vec3& ac) {
   return ac.dot(q) / determinant;
 }
 
+/// True when the triangle's bounding sphere lies outside the cone of this half angle about the
+/// axis.
+bool outside_cone(const Vec3& a, const Vec3& b, const Vec3& c, double half_angle_rad) {
+  const Vec3 centre = (a + b + c) / 3.0;
+  const double radius = std::sqrt(std::max(
+      {(a - centre).squaredNorm(), (b - centre).squaredNorm(), (c - centre).squaredNorm()}));
+  const double distance = centre.norm();
+  if (!(distance > radius)) return false;
+  return std::acos(std::clamp(centre.z() / distance, -1.0, 1.0)) - std::asin(radius / distance) >
+         half_angle_rad;
+}
+
 }  // namespace
 
 cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world,
                        const Lens& original_lens) {
   const Lens& lens = original_lens;
+  const LensProjector projector(lens);
   cv::Mat depth(lens.height, lens.width, CV_32F,
                 cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
+  const double lens_angle_rad = lens.max_angle_rad();
   std::vector<Corner> corners;
   corners.reserve(map.vertices.size());
   for (const Vec3& vertex : map.vertices) {
     const Vec3 p_cam = cam_from_world * vertex;
-    corners.push_back({p_cam, p_cam.z() > 0.0 ? lens.project(p_cam) : std::nullopt});
+    corners.push_back({p_cam, p_cam.z() > 0.0 ? projector.project(p_cam) : std::nullopt});
   }
   std::vector<Vec3> rays(static_cast<std::size_t>(lens.width) * lens.height, Vec3::Zero());
   for (int y = 0; y < lens.height; ++y)
     for (int x = 0; x < lens.width; ++x)
-      if (const auto ray = lens.unproject({x + 0.5, y + 0.5}))
+      if (const auto ray = projector.unproject({x + 0.5, y + 0.5}))
         rays[static_cast<std::size_t>(y) * lens.width + x] = *ray;
 
   for (const Vec3i& triangle : map.triangles) {
@@ -62,8 +76,9 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world,
     int projected = 0;
     for (const Corner* corner : c)
       if (corner->pixel) box.extend(*corner->pixel), ++projected;
-    if (projected == 0) continue;
-    // A triangle that reaches behind the camera may cover anything.
+    if (projected == 0 && outside_cone(c[0]->p_cam, c[1]->p_cam, c[2]->p_cam, lens_angle_rad))
+      continue;
+    // A triangle that reaches out of what the lens sees may cover anything.
     if (projected < 3) box = {Vec2(0, 0), Vec2(lens.width, lens.height)};
     const Vec2 margin = Vec2(1, 1) + kCurvedEdgeMargin * box.sizes();
     const int left = std::max(0, static_cast<int>(std::floor(box.min().x() - margin.x())));
