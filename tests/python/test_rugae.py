@@ -1,0 +1,145 @@
+"""The module against a plane known in closed form: test_rugae.py PLANE_DATASET_PROGRAM."""
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+import rugae
+
+PROGRAM = sys.argv.pop(1)
+NORMAL = np.array([0.1, -0.2, -1.0]) / np.linalg.norm([0.1, -0.2, -1.0])
+OFFSET_MM = -30.0
+FLOAT32 = 1e-5  # of depths of 30 mm and flows of a few px
+
+
+def pixel_grid(lens):
+    """Centres of all pixels, (rows * columns, 2)."""
+    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
+    return np.stack([x.ravel(), y.ravel()], axis=1)
+
+
+class RugaeTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.dataset_path = os.path.join(cls.folder.name, "dataset")
+        cls.estimate_path = os.path.join(cls.folder.name, "estimate")
+        subprocess.run([PROGRAM, cls.dataset_path, cls.estimate_path], check=True)
+        cls.dataset = rugae.Dataset(cls.dataset_path)
+        cls.estimate = rugae.Estimate(cls.estimate_path)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def lift(self, index):
+        """Points of all pixels of a frame in its camera, and in the world."""
+        lens = self.dataset.lens
+        rays = lens.unproject(pixel_grid(lens))
+        points = rays * (self.dataset.depth_mm(index).ravel() / rays[:, 2])[:, None]
+        pose = self.dataset.world_from_camera[index]
+        return points, points @ pose[:3, :3].T + pose[:3, 3]
+
+    def test_shapes_and_types(self):
+        d = self.dataset
+        self.assertEqual(len(d), 6)
+        self.assertEqual(d.world_from_camera.shape, (6, 4, 4))
+        self.assertEqual(d.times_s.shape, (6,))
+        for array, shape, dtype in [(d.image(0), (48, 64, 3), np.uint8), (d.depth_mm(0), (48, 64), np.float32),
+                                    (d.normal(0), (48, 64, 3), np.float32), (d.masks(0), (48, 64), np.uint8),
+                                    (d.flow_px(0), (48, 64, 2), np.float32)]:
+            self.assertEqual(array.shape, shape)
+            self.assertEqual(array.dtype, dtype)
+        self.assertIsNone(d.flow_px(5))
+        np.testing.assert_array_equal(d.image(-1), d.image(5))
+        with self.assertRaises(IndexError):
+            d.image(6)
+
+    def test_lens_round_trip(self):
+        lens = self.dataset.lens
+        pixels = pixel_grid(lens)
+        np.testing.assert_allclose(lens.project(lens.unproject(pixels) * 17.0), pixels, rtol=0, atol=1e-9)
+        self.assertTrue(np.isnan(lens.project([[0.0, 0.0, -1.0]])).all())
+        self.assertEqual(lens.matrix()[0, 2], lens.cx)
+        with self.assertRaises(ValueError):
+            lens.project([1.0, 2.0, 3.0])
+
+    def test_lifted_depth_lies_on_the_plane(self):
+        for index in range(len(self.dataset)):
+            _, world = self.lift(index)
+            np.testing.assert_allclose(world @ NORMAL, OFFSET_MM, rtol=0, atol=FLOAT32)
+
+    def test_image_is_rgb(self):
+        # The plane's red is a sine of x + y, its blue a sine of x alone.
+        _, world = self.lift(0)
+        red = 127.5 + 100.0 * np.sin(world[:, 0] + world[:, 1])
+        blue = 127.5 + 100.0 * np.sin(1.1 * world[:, 0])
+        image = self.dataset.image(0).reshape(-1, 3)
+        self.assertLessEqual(np.abs(image[:, 0] - red).max(), 1.001)
+        self.assertLessEqual(np.abs(image[:, 2] - blue).max(), 1.001)
+
+    def test_flow_is_reprojection(self):
+        d = self.dataset
+        for index in range(len(d) - 1):
+            _, world = self.lift(index)
+            pose = np.linalg.inv(d.world_from_camera[index + 1])
+            seen = d.lens.project(world @ pose[:3, :3].T + pose[:3, 3])
+            valid = (d.masks(index).ravel() & rugae.MASK_FLOW_VALID) != 0
+            flow = d.flow_px(index).reshape(-1, 2)
+            self.assertGreater(valid.mean(), 0.5)
+            np.testing.assert_allclose((pixel_grid(d.lens) + flow)[valid], seen[valid], rtol=0, atol=FLOAT32)
+            self.assertTrue(np.isnan(flow[~valid]).all())
+
+    def test_normals(self):
+        for index in range(len(self.dataset)):
+            expected = self.dataset.world_from_camera[index][:3, :3].T @ NORMAL
+            np.testing.assert_allclose(self.dataset.normal(index).reshape(-1, 3),
+                                       np.broadcast_to(expected, (48 * 64, 3)), rtol=0, atol=3.2e-5)
+
+    def test_wall(self):
+        self.assertEqual(self.dataset.wall_triangles.shape, (2, 3))
+        np.testing.assert_allclose(self.dataset.wall_vertices_mm @ NORMAL, OFFSET_MM, rtol=0, atol=1e-12)
+
+    def test_presets(self):
+        camera = rugae.load_camera("misumi-v5506")
+        self.assertEqual((camera.lens.width, camera.lens.height, camera.fps), (640, 480, 30.0))
+        with self.assertRaisesRegex(rugae.Error, "did you mean 'misumi-v5506'"):
+            rugae.load_camera("misumi-v550")
+
+    def test_errors_name_the_file(self):
+        with self.assertRaisesRegex(ValueError, "no-such-folder: no such folder"):
+            rugae.Dataset("no-such-folder")
+
+    def test_check(self):
+        self.assertEqual(rugae.check(self.dataset_path), [])
+
+    def test_estimate(self):
+        e = self.estimate
+        self.assertEqual((len(e), e.method, e.numbers["keyframes"]), (6, "test", 5.0))
+        self.assertEqual(e.states, ["keyframe", "keyframe", "lost", "keyframe", "keyframe", "keyframe"])
+        self.assertTrue(np.isnan(e.world_from_camera[2]).all())
+        self.assertEqual(e.map_triangles.shape, (2, 3))
+        self.assertEqual(e.points.shape, (4, 3))
+        self.assertIsNone(e.depth(0))
+        np.testing.assert_allclose(e.depth(1), 0.5 * self.dataset.depth_mm(1), rtol=1e-6)
+
+    def test_umeyama(self):
+        tracked = [i for i in range(6) if i != 2]
+        source = self.estimate.world_from_camera[tracked, :3, 3]
+        target = self.dataset.world_from_camera[tracked, :3, 3]
+        scale, rotation, translation = rugae.umeyama(source, target)
+        self.assertAlmostEqual(scale, 2.0, places=9)
+        np.testing.assert_allclose(scale * source @ rotation.T + translation, target, rtol=0, atol=1e-9)
+        self.assertIsNone(rugae.umeyama(source[:2], target[:2]))
+
+    def test_evaluate(self):
+        metrics = rugae.evaluate(self.dataset_path, self.estimate_path)
+        # The estimate is right up to a similarity. Its depth is half the truth's in mm, whose float32 limits the rest.
+        self.assertLessEqual(metrics["trajectory"]["ate_sim3_rmse_mm"], 1e-9)
+
+
+if __name__ == "__main__":
+    unittest.main()
