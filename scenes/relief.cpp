@@ -47,7 +47,10 @@ double Relief::strength(const AxisPoint& at) const {
   const double along = (zone_.fundus_strength + (1.0 - zone_.fundus_strength) * rise) * fall;
   // full to 60 degrees off the greater curvature, then down to the lesser
   const double around = smooth_step(-0.9, 0.5, at.cos_greater);
-  return along * (zone_.lesser_strength + (1.0 - zone_.lesser_strength) * around);
+  // narrow stubs have no room for folds
+  const double off_axis = std::sqrt(at.greater_mm * at.greater_mm + at.side_mm * at.side_mm);
+  const double room = smooth_step(5.0, 14.0, off_axis);
+  return room * along * (zone_.lesser_strength + (1.0 - zone_.lesser_strength) * around);
 }
 
 // Folds lie where a noise, stretched along the organ, crosses zero: such lines run along, meander,

@@ -73,6 +73,7 @@ struct Scene {
   std::vector<Region> regions;       // of the vertices
   Mucosa mucosa;
   std::uint64_t seed = 1;
+  std::vector<std::string> notes;  // of an imported mesh: what was found and done, a line each
 };
 
 /// A preset name, a YAML file, or any mesh file that assimp reads (units by `mm_per_unit` in YAML;

@@ -8,6 +8,7 @@
 #include "core/check.h"
 #include "scenes/isosurface.h"
 #include "scenes/portable_math.h"
+#include "scenes/subdivide.h"
 
 namespace rugae {
 namespace {
@@ -142,7 +143,7 @@ StomachWall make_stomach(const StomachOptions& options, std::uint64_t seed, doub
     vertices[v] = p - relief.height_mm(p, at) * gradient.normalized();
   });
   recut_quads(wall.mesh);
-  wall.mesh.normals = angle_weighted_normals(wall.mesh);
+  wall.mesh.normals = smooth_normals(wall.mesh);
   return wall;
 }
 
