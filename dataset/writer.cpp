@@ -8,6 +8,7 @@
 #include "dataset/frame_list.h"
 #include "dataset/image_io.h"
 #include "dataset/manifest.h"
+#include "dataset/ply_io.h"
 
 namespace rugae {
 namespace fs = std::filesystem;
@@ -71,6 +72,10 @@ void check_empty(const fs::path& root) {
 void remove_temporaries(const fs::path& root) {
   for (const std::string& file : files_below(root, ""))
     if (is_temporary(file)) fs::remove(root / file);
+}
+
+bool same_mesh(const TriangleMesh& a, const TriangleMesh& b) {
+  return a.vertices == b.vertices && a.triangles == b.triangles;
 }
 
 void check_label(const cv::Mat& label, int type, const cv::Mat& frame, const char* name,
@@ -140,6 +145,8 @@ void DatasetWriter::write_scene(const Camera& camera, const PoseTrack& track,
   write_same(layout_.camera(), camera_yaml(camera));
   write_same(layout_.trajectory(), tum_text(track));
   write_same(layout_.calibration(), lens_yaml(camera.lens, "calibration of " + camera.name));
+  check(!fs::exists(layout_.wall()) || same_mesh(read_ply(layout_.wall()), wall),
+        "{}: differs from this run's; choose another folder or remove it", layout_.wall().string());
   write_ply(layout_.wall(), wall, true);
   track_ = track;
   width_ = camera.lens.width;

@@ -38,7 +38,7 @@ class DatasetWriter {
   DatasetWriter(const std::filesystem::path& root, const DatasetInfo& info);
 
   /// Throws Error when the track has not one pose a frame, or when an earlier run wrote another
-  /// one.
+  /// camera, path or wall.
   void write_scene(const Camera& camera, const PoseTrack& track, const TriangleMesh& wall);
   /// True when all files of the frame are in place from an earlier run (files appear whole, so
   /// presence suffices).

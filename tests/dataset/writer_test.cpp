@@ -166,6 +166,18 @@ TEST(Writer, AnotherPathIsNotContinued) {
                 ": differs from this run's; choose another folder or remove it");
 }
 
+TEST(Writer, AnotherWallIsNotContinued) {
+  const TemporaryFolder folder("writer_wall");
+  const PlaneWorld world;
+  world.write(folder.path() / "d");
+  TriangleMesh wall = world.wall();
+  wall.vertices[1].x() += 1e-9;
+  DatasetWriter writer(folder.path() / "d", world.info());
+  EXPECT_EQ(error_of([&] { writer.write_scene(world.camera, world.track, wall); }),
+            writer.layout().wall().string() +
+                ": differs from this run's; choose another folder or remove it");
+}
+
 TEST(Writer, AFolderOfOtherThingsIsRefused) {
   const TemporaryFolder folder("writer_foreign");
   write_atomic(folder.path() / "thesis.txt", "precious");
