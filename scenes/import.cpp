@@ -132,7 +132,7 @@ ImportedWall import_wall(const std::filesystem::path& file, const ImportOptions&
                   .rise_to_mm = 0.25 * length,
                   .fall_from_mm = 0.6 * length,
                   .fall_to_mm = 0.85 * length};
-    const Relief relief(options.relief, zone, seed);
+    const Relief relief(options.relief, zone, axis, seed);
     auto& vertices = result.mesh.vertices;
     tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t v) {
       const Vec3 p = vertices[v];

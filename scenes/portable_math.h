@@ -36,6 +36,29 @@ inline double portable_log(double x) {
   return 2.0 * z * sum + (e + 0.5) * kLn2;
 }
 
+/// Sine and cosine of a full turn times `turns`, absolute error below 1e-6.
+struct SineCosine {
+  double sine, cosine;
+};
+inline SineCosine portable_turn(double turns) {
+  // a = the angle to the nearest quarter turn, at most pi/4; Taylor polynomials there
+  const double quarters = std::floor(4.0 * turns + 0.5);
+  const double a = (turns - 0.25 * quarters) * 6.283185307179586, aa = a * a;
+  const double s = a * (1.0 + aa * (-1.0 / 6.0 + aa * (1.0 / 120.0 + aa * (-1.0 / 5040.0))));
+  const double c =
+      1.0 + aa * (-0.5 + aa * (1.0 / 24.0 + aa * (-1.0 / 720.0 + aa * (1.0 / 40320.0))));
+  switch (static_cast<std::int64_t>(quarters) & 3) {
+    case 0:
+      return {s, c};
+    case 1:
+      return {c, -s};
+    case 2:
+      return {-s, -c};
+    default:
+      return {-c, s};
+  }
+}
+
 /// 0 below `from`, 1 above `to`, 3 t^2 - 2 t^3 between; `from` may be above `to`.
 template <typename T>
 inline T smooth_step(T from, T to, T x) {

@@ -11,12 +11,12 @@
 namespace rugae {
 namespace {
 
-// A fold runs this many times farther along the organ than across before it turns or joins another.
-constexpr double kElongation = 3.5;
-// Zero crossings of the fold noise lie this many cells apart across the folds (measured on the
-// noise).
-constexpr double kCellsPerFold = 1.108;
-constexpr double kMeanderMm = 9.0, kMeanderLengthMm = 50.0;
+// Lengths below are in units of the spacing of folds: kernels reach so far across the folds and
+// along them, and stand so far apart. A fold keeps its course over about the reach along.
+constexpr double kReachAcross = 2.2, kReachAlong = 3.6, kKernelStep = 1.5;
+constexpr double kMeanderRad = 0.9;  // of the direction, for a noise of one
+constexpr double kMeanderLengthMm = 45.0;
+constexpr double kWaveMm = 3.0, kWaveLengthMm = 17.0;  // the short bends of each fold
 
 }  // namespace
 
@@ -32,13 +32,67 @@ void ReliefOptions::check(const std::string& where) const {
   within("areae_depth_mm", areae_depth_mm, 0.0, 1.0);
 }
 
-Relief::Relief(const ReliefOptions& options, const FoldZone& zone, std::uint64_t seed)
+Relief::Relief(const ReliefOptions& options, const FoldZone& zone, const OrganAxis& axis,
+               std::uint64_t seed)
     : options_(options), zone_(zone) {
   const auto words = random_words(seed, Purpose::scene_relief, 0, 0);
-  fold_seed_ = words[0];
-  bend_seed_ = words[1];
-  vary_seed_ = words[2];
-  areae_seed_ = words[3];
+  wave_seed_ = words[0];
+  vary_seed_ = words[1];
+  areae_seed_ = words[2];
+  if (!(options.rugae_height_mm > 0.0)) return;
+
+  // one kernel a box of a jittered lattice around the axis
+  const double spacing = options.rugae_spacing_mm, step = kKernelStep * spacing;
+  const double reach = kReachAlong * spacing;
+  Eigen::AlignedBox3d box = axis.box();
+  box.min() -= Vec3::Constant(step);
+  box.max() += Vec3::Constant(step);
+  const Vec3i count = (box.sizes() / step).array().ceil().cast<int>();
+  std::uint64_t index = 0;
+  for (int z = 0; z < count.z(); ++z)
+    for (int y = 0; y < count.y(); ++y)
+      for (int x = 0; x < count.x(); ++x, ++index) {
+        const auto u = random_uniform(seed, Purpose::scene_relief, 1, index);
+        const auto v = random_uniform(seed, Purpose::scene_relief, 2, index);
+        Kernel k;
+        k.centre = box.min() + step * Vec3(x + u[0], y + u[1], z + u[2]);
+        k.phase_turns = u[3];
+        k.folds_per_mm = (0.9 + 0.2 * v[0]) / spacing;
+        const AxisPoint at = axis.locate(k.centre);
+        if (std::abs(at.distance_mm) > 2.0 * step) continue;
+        // around the organ, turned a little within the wall
+        const Vec3 outward = at.gradient.normalized();
+        const Vec3 along = (at.along - outward * outward.dot(at.along)).normalized();
+        const Vec3 across = along.cross(outward);
+        const double turn =
+            kMeanderRad * gradient_noise(k.centre / kMeanderLengthMm, words[3]).value / (2.0 * kPi);
+        const SineCosine sc = portable_turn(turn);
+        k.across = sc.cosine * across + sc.sine * along;
+        k.along = sc.cosine * along - sc.sine * across;
+        kernels_.push_back(k);
+      }
+
+  grid_origin_ = box.min() - Vec3::Constant(reach);
+  grid_size_ = ((box.sizes() + Vec3::Constant(2.0 * reach)) / step).array().ceil().cast<int>();
+  grid_.resize(static_cast<std::size_t>(grid_size_.prod()));
+  for (std::size_t i = 0; i < kernels_.size(); ++i) {
+    const Vec3 corner = kernels_[i].centre - grid_origin_;
+    const Vec3i low = ((corner - Vec3::Constant(reach)) / step).array().floor().cast<int>();
+    const Vec3i high = ((corner + Vec3::Constant(reach)) / step).array().floor().cast<int>();
+    for (int z = std::max(0, low.z()); z <= std::min(high.z(), grid_size_.z() - 1); ++z)
+      for (int y = std::max(0, low.y()); y <= std::min(high.y(), grid_size_.y() - 1); ++y)
+        for (int x = std::max(0, low.x()); x <= std::min(high.x(), grid_size_.x() - 1); ++x)
+          grid_[x + grid_size_.x() * (y + grid_size_.y() * z)].push_back(static_cast<int>(i));
+  }
+}
+
+const std::vector<int>* Relief::near(const Vec3& p) const {
+  const double step = kKernelStep * options_.rugae_spacing_mm;
+  const Vec3 cell = (p - grid_origin_) / step;
+  for (int a = 0; a < 3; ++a)
+    if (!(cell[a] >= 0.0 && cell[a] < grid_size_[a])) return nullptr;
+  const Vec3i c = cell.cast<int>();
+  return &grid_[c.x() + grid_size_.x() * (c.y() + grid_size_.y() * c.z())];
 }
 
 double Relief::strength(const AxisPoint& at) const {
@@ -53,47 +107,49 @@ double Relief::strength(const AxisPoint& at) const {
   return room * along * (zone_.lesser_strength + (1.0 - zone_.lesser_strength) * around);
 }
 
-// Folds lie where a noise, stretched along the organ, crosses zero: such lines run along, meander,
-// part and meet. The distance to the line is |n| / |grad n| to first order, which makes every fold
-// equally thick; where two lines meet, the gradient vanishes and the fold widens into a junction.
+// Folds are the crests of a phasor noise (Tricard et al., Procedural phasor noise, TOG 2019,
+// doi:10.1145/3306346.3322990): short wave trains across the organ, of random phase, are added as
+// complex numbers, and only the phase of the sum is kept. Crests are evenly spaced, run along the
+// organ, bend where the trains' directions do, and part or end where the sum vanishes.
 double Relief::rugae_mm(const Vec3& p, const AxisPoint& at) const {
   const double share = strength(at);
-  if (!(share > 0.0) || !(options_.rugae_height_mm > 0.0)) return 0.0;
-  const double cell = options_.rugae_spacing_mm / kCellsPerFold;
+  const std::vector<int>* kernels = share > 0.0 && !grid_.empty() ? near(p) : nullptr;
+  if (!kernels) return 0.0;
+  const double spacing = options_.rugae_spacing_mm;
+  const Vec3 wave = p / kWaveLengthMm;
+  const Vec3 q = p + kWaveMm * Vec3(gradient_noise(wave, wave_seed_).value,
+                                    gradient_noise(wave, wave_seed_ + 1).value,
+                                    gradient_noise(wave, wave_seed_ + 2).value);
+  double real = 0.0, imaginary = 0.0, total = 0.0;
+  const double across_scale = 1.0 / (kReachAcross * spacing),
+               along_scale = 1.0 / (kReachAlong * spacing);
+  for (const int i : *kernels) {
+    const Kernel& k = kernels_[i];
+    const Vec3 from = q - k.centre;
+    const double u = from.dot(k.across), v = from.dot(k.along);
+    const double through = from.squaredNorm() - u * u - v * v;
+    const double far =
+        (u * u + through) * across_scale * across_scale + v * v * along_scale * along_scale;
+    if (far >= 1.0) continue;
+    const double weight = (1.0 - far) * (1.0 - far);
+    const SineCosine sc = portable_turn(u * k.folds_per_mm + k.phase_turns);
+    real += weight * sc.cosine;
+    imaginary += weight * sc.sine;
+    total += weight * weight;
+  }
+  const double size = std::sqrt(real * real + imaginary * imaginary);
+  if (!(size > 1e-9)) return 0.0;
 
-  // meandering: the cross-section is shifted by slow noises
-  const NoiseSample shift_a = gradient_noise(p / kMeanderLengthMm, bend_seed_);
-  const NoiseSample shift_b = gradient_noise(p / kMeanderLengthMm, bend_seed_ + 1);
-  const Vec3 q((at.greater_mm + kMeanderMm * shift_a.value) / cell,
-               (at.side_mm + kMeanderMm * shift_b.value) / cell, at.s_mm / (cell * kElongation));
-
-  // two noises turned against each other hide the lattice
-  const Mat3 turn = (Mat3() << 0.8, -0.6, 0.0, 0.6, 0.8, 0.0, 0.0, 0.0, 1.0).finished();
-  const NoiseSample n0 = gradient_noise(q, fold_seed_);
-  const NoiseSample n1 = gradient_noise(1.21 * (turn * q) + Vec3(17.3, 5.1, 9.7), fold_seed_ + 1);
-  const double n = n0.value + 0.8 * n1.value;
-  const Vec3 g = n0.gradient + 0.8 * 1.21 * (turn.transpose() * n1.gradient);
-
-  // its gradient in space by the chain rule, and of that the part along the wall
-  constexpr double kShear = kMeanderMm / kMeanderLengthMm;
-  const Vec3 in_space =
-      (g.x() * (at.greater + kShear * shift_a.gradient) +
-       g.y() * (at.side + kShear * shift_b.gradient) + g.z() / kElongation * at.along) /
-      cell;
-  const Vec3 normal = at.gradient.normalized();
-  const double steep = (in_space - normal * normal.dot(in_space)).norm();
-  constexpr double kLeastSlope = 0.35;  // in noise units a cell: limits the width of junctions
-  const double slope = std::sqrt(steep * steep + kLeastSlope * kLeastSlope / (cell * cell));
-  const double distance = std::abs(n) / slope;
-
+  // distance to the crest from the cosine of the phase: 2 sin(phase / 2) = sqrt(2 - 2 cos)
+  const double distance = spacing / (2.0 * kPi) * std::sqrt(std::max(0.0, 2.0 - 2.0 * real / size));
   // soft-topped profile (1 - (d/w)^2)^2, half as high at d = w sqrt(1 - sqrt(1/2)) = 0.541 w
   const NoiseSample vary = gradient_noise(p / 27.0, vary_seed_);
   const double w = options_.rugae_thickness_mm / (2.0 * 0.5412) * (1.0 + 0.2 * vary.value);
   if (distance >= w) return 0.0;
   const double t = 1.0 - (distance / w) * (distance / w);
+  // where the sum is small against what random phases give, the crests part or end: low there
+  const double drawn = smooth_step(0.1, 0.6, size / std::sqrt(total));
   const NoiseSample height = gradient_noise(p / 19.0, vary_seed_ + 1);
-  // small closed lines, where the noise barely crosses zero, would be warts: they fade
-  const double drawn = smooth_step(0.35, 0.9, cell * steep);
   return options_.rugae_height_mm * share * drawn * std::min(1.0, 0.85 + 0.4 * height.value) * t *
          t;
 }

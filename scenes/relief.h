@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "scenes/organ_axis.h"
 
@@ -29,7 +30,9 @@ struct FoldZone {
 
 class Relief {
  public:
-  Relief(const ReliefOptions& options, const FoldZone& zone, std::uint64_t seed);
+  /// The folds follow the axis; the axis is not kept.
+  Relief(const ReliefOptions& options, const FoldZone& zone, const OrganAxis& axis,
+         std::uint64_t seed);
 
   /// Height in mm into the lumen, at `p` on the smooth wall, seen from the axis as `at`.
   double height_mm(const Vec3& p, const AxisPoint& at) const {
@@ -41,9 +44,21 @@ class Relief {
   double strength(const AxisPoint& at) const;
 
  private:
+  // A few parallel folds that fade out around their middle.
+  struct Kernel {
+    Vec3 centre, across, along;  // unit directions
+    double folds_per_mm, phase_turns;
+  };
+  const std::vector<int>* near(const Vec3& p) const;
+
   ReliefOptions options_;
   FoldZone zone_;
-  std::uint32_t fold_seed_, bend_seed_, vary_seed_, areae_seed_;
+  std::uint32_t wave_seed_, vary_seed_, areae_seed_;
+  std::vector<Kernel> kernels_;
+  // Indices of the kernels that reach into each box of a grid.
+  Vec3 grid_origin_ = Vec3::Zero();
+  Vec3i grid_size_ = Vec3i::Zero();
+  std::vector<std::vector<int>> grid_;
 };
 
 }  // namespace rugae

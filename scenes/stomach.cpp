@@ -127,7 +127,7 @@ double StomachShape::length_mm() const {
 
 StomachWall make_stomach(const StomachOptions& options, std::uint64_t seed, double cell_mm) {
   const StomachShape shape(options.scale);
-  const Relief relief(options.relief, shape.fold_zone(), seed);
+  const Relief relief(options.relief, shape.fold_zone(), shape.axis(), seed);
   constexpr int kRelaxRounds = 6;
   StomachWall wall;
   wall.mesh = isosurface([&](const Vec3& p, Vec3& g) { return shape.distance_mm(p, g); },
