@@ -17,6 +17,9 @@ endif()
 # The same frame on every x86-64 machine: no contraction into fused multiply-add, no flags of the local processor
 # (Debian's Eigen users, Ceres and Open3D, share Eigen types with us and are built for plain x86-64).
 add_compile_options(-Wall -Wextra -ffp-contract=off)
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  add_compile_options(-Wno-restrict)  # false alarms in std::string: https://gcc.gnu.org/PR105651
+endif()
 if(RUGAE_WERROR)
   add_compile_options(-Werror)
 endif()
@@ -48,10 +51,6 @@ find_path(RANDOM123_INCLUDE Random123/philox.h REQUIRED)
 function(rugae_library name)
   cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE;PCH" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
-  if(NOT sources)  # TEMPORARY while the folders fill
-    file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/empty.cpp "")
-    set(sources ${CMAKE_CURRENT_BINARY_DIR}/empty.cpp)
-  endif()
   add_library(rugae_${name} STATIC ${sources})
   add_library(rugae::${name} ALIAS rugae_${name})
   target_include_directories(rugae_${name} PUBLIC ${PROJECT_SOURCE_DIR})
