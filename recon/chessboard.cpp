@@ -1,0 +1,133 @@
+#include "recon/chessboard.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace rugae {
+namespace {
+
+enum class Look { plain, flattened, local_contrast };
+
+struct Attempt {
+  Look look;
+  double width_px;  // the picture is resized to about this width
+};
+// In the order of how often each finds the board in small capsule pictures.
+constexpr std::array<Attempt, 8> kAttempts{{{Look::plain, 640},
+                                            {Look::flattened, 640},
+                                            {Look::local_contrast, 640},
+                                            {Look::plain, 320},
+                                            {Look::flattened, 320},
+                                            {Look::local_contrast, 320},
+                                            {Look::flattened, 960},
+                                            {Look::plain, 960}}};
+constexpr double kMaxZoom = 4.0;
+constexpr int kSmallestBoard = 3;  // inner corners a side
+
+cv::Mat prepare(const cv::Mat& gray, Look look, double zoom) {
+  cv::Mat image;
+  cv::resize(gray, image, {}, zoom, zoom, zoom < 1.0 ? cv::INTER_AREA : cv::INTER_CUBIC);
+  if (look == Look::flattened) {
+    // Divided by its wide blur: the light falls off slowly, the squares do not.
+    cv::Mat value, blurred;
+    image.convertTo(value, CV_32F);
+    cv::GaussianBlur(value, blurred, {}, image.cols / 25.0);
+    const cv::Mat ratio = value / (blurred + 4.0);
+    ratio.convertTo(image, CV_8U, 110.0);
+  } else if (look == Look::local_contrast) {
+    cv::createCLAHE(3.0, {4, 4})->apply(image, image);
+  }
+  return image;
+}
+
+double shortest_spacing(const std::vector<cv::Point2f>& corners, int columns) {
+  double shortest = 1e9;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const bool last = (i + 1) % static_cast<std::size_t>(columns) == 0;
+    if (!last) shortest = std::min(shortest, cv::norm(corners[i + 1] - corners[i]));
+    if (i + static_cast<std::size_t>(columns) < corners.size())
+      shortest =
+          std::min(shortest, cv::norm(corners[i + static_cast<std::size_t>(columns)] - corners[i]));
+  }
+  return shortest;
+}
+
+// Twice the signed area of the outer corners' quadrangle: positive when the board's axes run as
+// the image's.
+double signed_area(const std::vector<cv::Point2f>& c, int columns) {
+  const cv::Point2f &a = c.front(), &b = c[static_cast<std::size_t>(columns) - 1], &d = c.back(),
+                    &e = c[c.size() - static_cast<std::size_t>(columns)];
+  return (d - a).cross(e - b);
+}
+
+BoardView to_view(const cv::Mat& gray, std::vector<cv::Point2f> corners, double zoom, int columns,
+                  int rows) {
+  // resize() maps pixel areas: (x + 0.5) = (X + 0.5) / zoom.
+  for (cv::Point2f& c : corners) {
+    c.x = static_cast<float>((c.x + 0.5) / zoom - 0.5);
+    c.y = static_cast<float>((c.y + 0.5) / zoom - 0.5);
+  }
+  // The window stays inside the four squares around a corner.
+  const int half = std::clamp(static_cast<int>(0.35 * shortest_spacing(corners, columns)), 2, 11);
+  std::vector<cv::Point2f> refined = corners;
+  cv::cornerSubPix(gray, refined, {half, half}, {-1, -1},
+                   {cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 50, 1e-3});
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    // A saturated or dark square next to a corner leads the refinement astray.
+    if (cv::norm(refined[i] - corners[i]) <= 0.5 * half) corners[i] = refined[i];
+  }
+  if (signed_area(corners, columns) < 0.0) {
+    for (int r = 0; r < rows; ++r)
+      std::reverse(corners.begin() + r * columns, corners.begin() + (r + 1) * columns);
+  }
+  BoardView view;
+  view.columns = columns;
+  view.rows = rows;
+  for (const cv::Point2f& c : corners) view.corners_px.emplace_back(c.x + 0.5, c.y + 0.5);
+  return view;
+}
+
+double zoom_of(const Attempt& attempt, const cv::Mat& gray) {
+  return std::min(kMaxZoom, attempt.width_px / gray.cols);
+}
+
+}  // namespace
+
+std::optional<BoardView> find_board(const cv::Mat& gray, int columns, int rows) {
+  for (const bool classic : {false, true}) {
+    for (const Attempt& attempt : kAttempts) {
+      const double zoom = zoom_of(attempt, gray);
+      const cv::Mat image = prepare(gray, attempt.look, zoom);
+      std::vector<cv::Point2f> corners;
+      const bool found = classic ? cv::findChessboardCorners(
+                                       image, {columns, rows}, corners,
+                                       cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE)
+                                 : cv::findChessboardCornersSB(image, {columns, rows}, corners,
+                                                               cv::CALIB_CB_NORMALIZE_IMAGE |
+                                                                   cv::CALIB_CB_EXHAUSTIVE |
+                                                                   cv::CALIB_CB_ACCURACY);
+      if (found) return to_view(gray, std::move(corners), zoom, columns, rows);
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::pair<int, int>> find_board_size(const cv::Mat& gray) {
+  for (const Attempt& attempt : kAttempts) {
+    const cv::Mat image = prepare(gray, attempt.look, zoom_of(attempt, gray));
+    std::vector<cv::Point2f> corners;
+    cv::Mat meta;
+    const bool found = cv::findChessboardCornersSB(
+        image, {kSmallestBoard, kSmallestBoard}, corners,
+        cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER | cv::CALIB_CB_EXHAUSTIVE, meta);
+    if (found && meta.cols >= kSmallestBoard && meta.rows >= kSmallestBoard)
+      return std::make_pair(std::max(meta.cols, meta.rows), std::min(meta.cols, meta.rows));
+  }
+  return std::nullopt;
+}
+
+}  // namespace rugae
