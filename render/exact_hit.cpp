@@ -28,26 +28,47 @@ ExactHit::ExactHit(const TriangleMesh& mesh)
       triangles_of_vertex_[next[mesh.triangles[i][k]]++] = static_cast<int>(i);
 }
 
-// With corners a, b, c relative to the origin, the volumes d . (c x b), d . (a x c), d . (b x a)
-// are the barycentric coordinates times their sum. The volume of an edge changes exactly its sign,
-// and nothing else, for the triangle on its other side: no ray slips between two neighbours
-// (Davidovic et al., 3D rasterization: a bridge between rasterization and ray casting, 2012).
-ExactHit::Meeting ExactHit::meet(const Vec3& origin, const Vec3& direction, int triangle) const {
+// Corners are sheared into a frame in which the ray is the third axis, and the edge functions are
+// taken of the other two coordinates. A corner's coordinates do not depend on the triangle, and an
+// edge's function changes its sign exactly, and nothing else, for the triangle on its other side:
+// no ray slips between neighbours (Woop et al., Watertight ray/triangle intersection, JCGT 2(1),
+// 2013).
+struct ExactHit::Ray {
+  Vec3 origin;
+  int x, y, z;  // axes; z is the one along which the ray runs fastest
+  double shear_x, shear_y, along;
+
+  Ray(const Vec3& o, const Vec3& direction) : origin(o) {
+    direction.cwiseAbs().maxCoeff(&z);
+    x = z == 2 ? 0 : z + 1;
+    y = x == 2 ? 0 : x + 1;
+    along = 1.0 / direction[z];
+    shear_x = direction[x] * along;
+    shear_y = direction[y] * along;
+  }
+  Vec3 operator()(const Vec3& p) const {
+    const Vec3 d = p - origin;
+    return {d[x] - shear_x * d[z], d[y] - shear_y * d[z], d[z]};
+  }
+};
+
+ExactHit::Meeting ExactHit::meet(const Ray& ray, int triangle) const {
   const Vec3i& t = mesh_->triangles[triangle];
-  const Vec3 a = mesh_->vertices[t[0]] - origin, b = mesh_->vertices[t[1]] - origin,
-             c = mesh_->vertices[t[2]] - origin;
-  const double u = direction.dot(c.cross(b)), v = direction.dot(a.cross(c)),
-               w = direction.dot(b.cross(a));
+  const Vec3 a = ray(mesh_->vertices[t[0]]), b = ray(mesh_->vertices[t[1]]),
+             c = ray(mesh_->vertices[t[2]]);
+  const double u = c.x() * b.y() - c.y() * b.x(), v = a.x() * c.y() - a.y() * c.x(),
+               w = b.x() * a.y() - b.y() * a.x();
   const double inverse = 1.0 / (u + v + w);
-  const Vec3 normal = (b - a).cross(c - a);
-  return {normal.dot(a) / normal.dot(direction), u * inverse, v * inverse, w * inverse};
+  const double b0 = u * inverse, b1 = v * inverse, b2 = w * inverse;
+  return {(b0 * a.z() + b1 * b.z() + b2 * c.z()) * ray.along, b0, b1, b2};
 }
 
-Hit ExactHit::operator()(const Vec3& origin, const Vec3& direction, int proposed) const {
-  const Meeting first = meet(origin, direction, proposed);
+Hit ExactHit::operator()(const Vec3& origin, const Vec3& direction, int proposed,
+                         bool strictly) const {
+  const Ray ray(origin, direction);
+  const Meeting first = meet(ray, proposed);
   const auto as_hit = [](int triangle, const Meeting& m) {
-    return Hit{triangle, m.range_mm, static_cast<float>(std::clamp(m.b1, 0.0, 1.0)),
-               static_cast<float>(std::clamp(m.b2, 0.0, 1.0))};
+    return Hit{triangle, m.range_mm, static_cast<float>(m.b1), static_cast<float>(m.b2)};
   };
   if (std::min({first.b0, first.b1, first.b2}) > kNearEdge) return as_hit(proposed, first);
 
@@ -57,7 +78,7 @@ Hit ExactHit::operator()(const Vec3& origin, const Vec3& direction, int proposed
     const int vertex = mesh_->triangles[proposed][k];
     for (int i = first_of_vertex_[vertex]; i < first_of_vertex_[vertex + 1]; ++i) {
       const int triangle = triangles_of_vertex_[i];
-      const Meeting m = meet(origin, direction, triangle);
+      const Meeting m = meet(ray, triangle);
       // Written so that the not-a-number of a triangle seen edge-on is no hit.
       if (!(m.b0 >= 0.0 && m.b1 >= 0.0 && m.b2 >= 0.0 && m.range_mm > 0.0)) continue;
       const double slack = kSamePlace * m.range_mm;
@@ -70,10 +91,19 @@ Hit ExactHit::operator()(const Vec3& origin, const Vec3& direction, int proposed
     }
   }
   if (best >= 0) return as_hit(best, best_meeting);
-  // The exact ray passes the outline within the traversal's rounding: the plane of the proposed
-  // triangle is met at most that far outside of it, unless the plane is seen edge-on.
-  if (!std::isfinite(first.range_mm) || !(first.range_mm > 0.0)) return {};
-  return as_hit(proposed, first);
+  return strictly ? Hit{} : nearest_on(ray, proposed, first);
+}
+
+// The exact ray passes the outline of the wall within the traversal's rounding: the point of the
+// proposed triangle next to it.
+Hit ExactHit::nearest_on(const Ray& ray, int triangle, const Meeting& meeting) const {
+  Vec3 b(meeting.b0, meeting.b1, meeting.b2);
+  b = b.allFinite() ? Vec3(b.cwiseMax(0.0)) : Vec3(1.0, 0.0, 0.0);  // seen edge-on: a corner
+  b /= b.sum();
+  const Vec3i& t = mesh_->triangles[triangle];
+  double along = 0.0;
+  for (int k = 0; k < 3; ++k) along += b[k] * ray(mesh_->vertices[t[k]]).z();
+  return {triangle, along * ray.along, static_cast<float>(b[1]), static_cast<float>(b[2])};
 }
 
 }  // namespace rugae

@@ -24,15 +24,20 @@ class ExactHit {
  public:
   explicit ExactHit(const TriangleMesh& mesh);  // keeps a reference: the mesh must outlive it
 
-  /// The hit of the ray origin + t direction (unit) near the proposed triangle.
-  Hit operator()(const Vec3& origin, const Vec3& direction, int proposed) const;
+  /// The hit of the ray origin + t direction (unit) at the proposed triangle or a neighbour. Where
+  /// the exact ray misses all of them, past an outline: the next point of the proposed triangle, or
+  /// no hit when `strictly`.
+  Hit operator()(const Vec3& origin, const Vec3& direction, int proposed,
+                 bool strictly = false) const;
 
  private:
+  struct Ray;
   struct Meeting {
     double range_mm;
     double b0, b1, b2;
   };
-  Meeting meet(const Vec3& origin, const Vec3& direction, int triangle) const;
+  Meeting meet(const Ray& ray, int triangle) const;
+  Hit nearest_on(const Ray& ray, int triangle, const Meeting& meeting) const;
 
   const TriangleMesh* mesh_;
   std::vector<int> first_of_vertex_, triangles_of_vertex_;  // the triangles around a vertex

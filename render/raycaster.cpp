@@ -61,6 +61,39 @@ void set_ray(Ray& ray, int lane, const Vec3& origin, const Vec3& direction, doub
   ray.flags[lane] = 0;
 }
 
+// Even the robust traversal lets a ray slip through a corner at times. Rays a little beside it
+// propose the triangles around the corner; the exact ray decides.
+Hit beside(RTCScene scene, const ExactHit& exact, const Vec3& origin, const Vec3& local_origin,
+           const Vec3& direction) {
+  constexpr double kBeside = 4e-6;  // rad: some roundings of single precision
+  const Vec3 across = direction.unitOrthogonal();
+  for (double side : {kBeside, -kBeside}) {
+    const Vec3 d = direction + side * across;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit ray{};
+    ray.ray = {static_cast<float>(local_origin.x()),
+               static_cast<float>(local_origin.y()),
+               static_cast<float>(local_origin.z()),
+               0.0f,
+               static_cast<float>(d.x()),
+               static_cast<float>(d.y()),
+               static_cast<float>(d.z()),
+               0.0f,
+               std::numeric_limits<float>::infinity(),
+               ~0u,
+               0,
+               0};
+    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(scene, &context, &ray);
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+    const Hit hit = exact(origin, direction, static_cast<int>(ray.hit.primID), true);
+    if (hit.met()) return hit;
+  }
+  return {};
+}
+
 template <int N>
 void intersect_packets(RTCScene scene, const ExactHit& exact, const Vec3& origin,
                        const Vec3& local_origin, std::span<const Vec3> directions,
@@ -80,10 +113,14 @@ void intersect_packets(RTCScene scene, const ExactHit& exact, const Vec3& origin
     }
     Packet<N>::intersect(active, scene, &context, &packet);
     for (int lane = 0; lane < count; ++lane) {
-      const bool met = active[lane] && packet.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID;
-      hits[begin + lane] =
-          met ? exact(origin, directions[begin + lane], static_cast<int>(packet.hit.primID[lane]))
-              : Hit{};
+      Hit& hit = hits[begin + lane];
+      const Vec3& direction = directions[begin + lane];
+      if (!active[lane])
+        hit = {};
+      else if (packet.hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID)
+        hit = beside(scene, exact, origin, local_origin, direction);
+      else
+        hit = exact(origin, direction, static_cast<int>(packet.hit.primID[lane]));
     }
   }
 }

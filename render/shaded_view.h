@@ -14,7 +14,7 @@ struct ShadedViewOptions {
   Vec3f clay_srgb{0.80f, 0.74f, 0.68f};  // of meshes without vertex colours
   bool cull_front = false;  // leaves out triangles whose normal faces the camera: looks into an
                             // organ from outside
-  int samples = 2;  // per pixel and direction, against jagged edges
+  int samples = 2;          // per pixel and direction, against jagged edges
 };
 
 /// CV_8UC3, BGR, of the lens' size; vertex colours where the mesh has them, darkened by the cosine
