@@ -1,3 +1,5 @@
+#include <functional>
+
 #include "core/check.h"
 #include "core/presets.h"
 #include "core/units.h"
@@ -8,6 +10,44 @@ namespace rugae {
 namespace {
 
 constexpr int kMaxLikes = 8;  // a chain of `like` this long goes in a circle
+
+/// Where a field stands ("loops.count"), for errors: file, line and column, or a name.
+using PlaceOf = std::function<std::string(const std::string& field)>;
+
+void check_ranges(const TrajectoryOptions& o, const PlaceOf& place_of) {
+  const auto in_range = [&](const char* field, double value, double low, double high) {
+    check(value >= low && value <= high, "{}: {} is {}, expected {} to {}", place_of(field), field,
+          value, low, high);
+  };
+  in_range("paper_number", o.paper_number, 0, 6);
+  in_range("length_cm", o.length_cm, 1.0, 10000.0);
+  in_range("clearance_mm", o.clearance_mm, 0.0, 1000.0);
+  in_range("passes", o.passes, 1, 1000);
+  in_range("winding_turns", o.winding_turns, 0.0, 100.0);
+  in_range("offset_share", o.offset_share, 0.0, 0.9);
+  in_range("loops.count", o.loops.count, 0, 1000);
+  in_range("loops.per_station", o.loops.per_station, 1, 100);
+  in_range("view.tilt_deg", deg_from_rad(o.view.tilt_rad), -40.0, 40.0);
+  in_range("view.sway_deg", deg_from_rad(o.view.sway_rad), 0.0, 120.0);
+  in_range("view.sway_cycles", o.view.sway_cycles, 0.0, 200.0);
+  in_range("pace.peak_speed", o.pace.peak_speed, 1.0, 20.0);
+  in_range("pace.bursts", o.pace.bursts, 0, 1000);
+  in_range("pace.burst_share", o.pace.burst_share, 0.0, 0.5);
+  check(o.pace.bursts == 0 || o.pace.peak_speed * o.pace.burst_share < 1.0,
+        "{}: pace.peak_speed times pace.burst_share is {}, expected less than 1 (the mean speed is "
+        "1)",
+        place_of("pace.peak_speed"), o.pace.peak_speed * o.pace.burst_share);
+  in_range("read_noise_factor", o.read_noise_factor, 0.0, 1000.0);
+  in_range("oil", o.oil, 0.0, 1.0);
+}
+
+/// A field of a group stands where the group's reader says, any other where the file's does.
+std::string place_in(YamlReader& yaml, const std::string& field) {
+  const std::size_t dot = field.find('.');
+  if (dot == std::string::npos) return yaml.where(field);
+  const auto group = yaml.child(field.substr(0, dot));
+  return group ? group->where(field.substr(dot + 1)) : yaml.where(field);
+}
 
 void read(YamlReader& yaml, TrajectoryOptions& options) {
   yaml.get("paper_number", options.paper_number);
@@ -61,7 +101,7 @@ TrajectoryOptions load(const std::string& name_or_path, const std::filesystem::p
   if (!track.empty()) options.file = file.parent_path() / track;
   read(yaml, options);
   yaml.finish();
-  options.check(file.string());
+  check_ranges(options, [&](const std::string& field) { return place_in(yaml, field); });
   return options;
 }
 
@@ -72,30 +112,7 @@ TrajectoryOptions load_trajectory(const std::string& name_or_path) {
 }
 
 void TrajectoryOptions::check(const std::string& where) const {
-  const auto in_range = [&](const char* field, double value, double low, double high) {
-    rugae::check(value >= low && value <= high, "{}: {} is {}, expected {} to {}", where, field,
-                 value, low, high);
-  };
-  in_range("paper_number", paper_number, 0, 6);
-  in_range("length_cm", length_cm, 1.0, 10000.0);
-  in_range("clearance_mm", clearance_mm, 0.0, 1000.0);
-  in_range("passes", passes, 1, 1000);
-  in_range("winding_turns", winding_turns, 0.0, 100.0);
-  in_range("offset_share", offset_share, 0.0, 0.9);
-  in_range("loops.count", loops.count, 0, 1000);
-  in_range("loops.per_station", loops.per_station, 1, 100);
-  in_range("view.tilt_deg", deg_from_rad(view.tilt_rad), -40.0, 40.0);
-  in_range("view.sway_deg", deg_from_rad(view.sway_rad), 0.0, 120.0);
-  in_range("view.sway_cycles", view.sway_cycles, 0.0, 200.0);
-  in_range("pace.peak_speed", pace.peak_speed, 1.0, 20.0);
-  in_range("pace.bursts", pace.bursts, 0, 1000);
-  in_range("pace.burst_share", pace.burst_share, 0.0, 0.5);
-  rugae::check(pace.bursts == 0 || pace.peak_speed * pace.burst_share < 1.0,
-               "{}: pace.peak_speed times pace.burst_share is {}, expected less than 1 (the mean "
-               "speed is 1)",
-               where, pace.peak_speed * pace.burst_share);
-  in_range("read_noise_factor", read_noise_factor, 0.0, 1000.0);
-  in_range("oil", oil, 0.0, 1.0);
+  check_ranges(*this, [&](const std::string&) { return where; });
 }
 
 }  // namespace rugae

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/check.h"
 
@@ -11,6 +12,7 @@ namespace rugae {
 namespace {
 
 constexpr double kCheckStepMm = 0.25;
+constexpr double kNone = std::numeric_limits<double>::infinity();
 constexpr int kPositionBits = 30;  // behind the point: 1e-9 mm
 constexpr int kRotationBits = 40;  // 1e-12
 
@@ -66,13 +68,25 @@ std::string place_text(const Vec3& p) {
 Clearance least_clearance(const FreeSpace& space, const std::vector<Vec3>& positions,
                           const Travel& arc) {
   const int steps = static_cast<int>(std::ceil(arc.total() / kCheckStepMm));
-  std::vector<double> depth(steps + 1);
-  const auto point = [&](int i) {
-    return spline_value(positions, arc.parameter(arc.total() * i / std::max(steps, 1)));
-  };
-  tbb::parallel_for(0, steps + 1, [&](int i) { depth[i] = space.depth_mm(point(i)); });
-  const int least = static_cast<int>(std::ranges::min_element(depth) - depth.begin());
-  return {depth[least], arc.total() * least / std::max(steps, 1), point(least)};
+  const double step_mm = arc.total() / std::max(steps, 1);
+  const auto point = [&](int i) { return spline_value(positions, arc.parameter(step_mm * i)); };
+  // Distance changes by at most the way gone: after a sample that is deeper than the least by
+  // k steps, the next k cannot undercut it. Stretches of fixed length, so that threads do not
+  // matter.
+  constexpr int kStretch = 128;
+  std::vector<Clearance> stretches(steps / kStretch + 1, Clearance{kNone, 0.0, Vec3::Zero()});
+  tbb::parallel_for(std::size_t{0}, stretches.size(), [&](std::size_t s) {
+    Clearance& least = stretches[s];
+    const int begin = static_cast<int>(s) * kStretch, end = std::min(begin + kStretch, steps + 1);
+    for (int i = begin; i < end;) {
+      const Vec3 p = point(i);
+      const double depth = space.depth_mm(p);
+      if (!(depth >= least.least_mm)) least = {depth, step_mm * i, p};
+      const double skipped = step_mm > 0.0 ? (depth - least.least_mm) / step_mm : 0.0;
+      i += 1 + static_cast<int>(std::clamp(skipped, 0.0, double(kStretch)));
+    }
+  });
+  return *std::ranges::min_element(stretches, {}, &Clearance::least_mm);
 }
 
 void require_clearance(const Clearance& found, double clearance_mm, const std::string& name) {

@@ -86,12 +86,18 @@ class LengthFit {
     for (int i = 0; i <= 16; ++i)
       widest = std::max(widest, kLargestLoopShare * tube_.extent_mm(tube_.length_mm() * i / 16, 0));
     for (size.loops = options_.loops.count; size.loops <= kMostLoops * options_.loops.count;
-         size.loops += options_.loops.per_station) {
+         size.loops += more_loops(size.loops)) {
       size.loop_mm = widest;
       if (length(size) < target_mm_) continue;
       return solve(size, size.loop_mm, kSmallestLoopMm, widest);
     }
     return {size, false};
+  }
+
+  /// An eighth more, whole stations.
+  int more_loops(int loops) const {
+    const int each = options_.loops.per_station;
+    return std::max(1, loops / (8 * each)) * each;
   }
 
   /// Bisection on one member of `size`, from low (too short) to high (too long).

@@ -42,7 +42,7 @@ std::vector<Quat> minimal_frames(const std::vector<Vec3>& points,
 /// How far from `origin` in direction `ray` the space stays at least `keep_mm` deep: steps as long
 /// as the distance to the wall allows.
 double free_distance(const FreeSpace& space, const Vec3& origin, const Vec3& ray, double keep_mm) {
-  constexpr double kStopMm = 0.05;
+  constexpr double kStopMm = 0.2;
   constexpr int kMaxSteps = 200;
   double t = 0.0;
   for (int step = 0; step < kMaxSteps; ++step) {
