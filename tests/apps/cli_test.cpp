@@ -1,0 +1,206 @@
+// The program as a user meets it: bad input ends in one line and a documented exit code.
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "core/files.h"
+
+namespace rugae {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kDone = 0, kBadInput = 2, kGateFailed = 3;
+
+struct Outcome {
+  int code = -1;
+  std::string out, error;
+};
+
+class CommandLine : public ::testing::Test {
+ protected:
+  void SetUp() override { fs::create_directories(folder_); }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  Outcome rugae(const std::string& arguments) const {
+    const fs::path out = folder_ / "stdout.txt", error = folder_ / "stderr.txt";
+    const std::string command = std::string("cd '") + folder_.string() + "' && '" + RUGAE_PROGRAM +
+                                "' " + arguments + " >'" + out.string() + "' 2>'" + error.string() +
+                                "'";
+    const int status = std::system(command.c_str());
+    Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text(out), read_text(error)};
+    if (!outcome.error.empty() && outcome.error.back() == '\n') outcome.error.pop_back();
+    return outcome;
+  }
+  void expect_refused(const std::string& arguments, const std::string& message) const {
+    const Outcome outcome = rugae(arguments);
+    EXPECT_EQ(outcome.code, kBadInput) << arguments;
+    EXPECT_EQ(outcome.error, "rugae: " + message) << arguments;
+  }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+  }
+  fs::path small_dataset() const {
+    write("tiny.yaml", kTinyCamera);
+    const Outcome made = rugae(
+        "simulate --resolution coarse --camera tiny.yaml --trajectory 1 --frames 4 --out data");
+    EXPECT_EQ(made.code, kDone) << made.error;
+    return folder_ / "data";
+  }
+
+  static constexpr const char* kTinyCamera =
+      "lens: {width: 64, height: 48, horizontal_fov_deg: 100, k1: -0.1}\n"
+      "sensor: {pixel_pitch_um: 6, fps: 30, bit_depth: 10, full_well_e: 18000, read_noise_e: 10}\n";
+  fs::path folder_ =
+      fs::temp_directory_path() /
+      ("rugae_cli_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
+};
+
+TEST_F(CommandLine, HelpAndVersion) {
+  EXPECT_EQ(rugae("--help").code, kDone);
+  EXPECT_EQ(rugae("simulate --help").code, kDone);
+  EXPECT_EQ(rugae("--version").code, kDone);
+}
+
+TEST_F(CommandLine, UnknownCommandsAndOptionsOfferTheNearest) {
+  expect_refused("simualte",
+                 "'simualte': no such command; did you mean 'simulate'?; known: simulate, "
+                 "calibrate, reconstruct, "
+                 "evaluate, run, check, list");
+  expect_refused("simulate --camrea x --out y",
+                 "simulate: unknown option '--camrea'; did you mean '--camera'?");
+  expect_refused("simulate", "simulate: --out is required; see rugae simulate --help");
+  expect_refused("list camera",
+                 "list 'camera': no such kind; did you mean 'cameras'?; known: scenes, cameras, "
+                 "trajectories, studies");
+}
+
+TEST_F(CommandLine, MisspeltCameraOffersTheNearest) {
+  expect_refused(
+      "simulate --camera misumi-v550 --out out",
+      "camera 'misumi-v550': no such preset; did you mean 'misumi-v5506'?; known: awaiba-naneye, "
+      "misumi-v3506, misumi-v5506, potensic-mini");
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+}
+
+TEST_F(CommandLine, MissingMesh) {
+  expect_refused("simulate --scene nowhere.ply --out out", "scene 'nowhere.ply': no such file");
+}
+
+TEST_F(CommandLine, MeshWithoutTriangles) {
+  write("points.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+        "float z\n"
+        "end_header\n0 0 0\n1 0 0\n0 1 0\n");
+  expect_refused("simulate --scene points.ply --out out", "points.ply: no triangles");
+}
+
+TEST_F(CommandLine, MeshWithAVertexThatIsNotFinite) {
+  write(
+      "nan.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
+      "z\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 nan 0\n0 1 0\n"
+      "3 0 1 2\n");
+  expect_refused("simulate --scene nan.ply --out out",
+                 "nan.ply: vertex 1 is not finite (1, nan, 0)");
+}
+
+TEST_F(CommandLine, UnknownYamlKeyHasLineAndColumn) {
+  write("tiny.yaml", "lens: {width: 64, height: 48, horizontal_fov_deg: 100}\nsensr: 3\n");
+  expect_refused("simulate --camera tiny.yaml --out out", "tiny.yaml:1:1: key 'sensor' is missing");
+  write("study.yaml", "frames: 4\ncamreas: [misumi-v5506]\n");
+  expect_refused("run study.yaml --out out",
+                 "study.yaml:2:1: unknown key 'camreas'; did you mean 'cameras'?");
+}
+
+TEST_F(CommandLine, OutputFolderThatCannotBe) {
+  write("file", "x");
+  expect_refused("simulate --out file/out",
+                 "file/out: output folder cannot be created: Not a directory");
+}
+
+TEST_F(CommandLine, DamagedDatasetsAreNamed) {
+  const fs::path data = small_dataset();
+  EXPECT_EQ(rugae("check data").code, kDone);
+
+  const fs::path frame = data / "observations" / "frames" / "000002.png";
+  const std::string whole = read_text(frame);
+  write("data/observations/frames/000002.png", whole.substr(0, whole.size() / 2));
+  const Outcome truncated = rugae("check data");
+  EXPECT_EQ(truncated.code, kBadInput);
+  EXPECT_NE(truncated.out.find("data/observations/frames/000002.png: truncated or not an image"),
+            std::string::npos)
+      << truncated.out;
+  expect_refused("reconstruct data --out est",
+                 "data/observations/frames/000002.png: truncated or not an image");
+  write("data/observations/frames/000002.png", whole);
+
+  std::string track = read_text(data / "truth" / "trajectory.txt");
+  track[track.size() - 2] = track[track.size() - 2] == '1' ? '2' : '1';
+  write("data/truth/trajectory.txt", track);
+  const Outcome changed = rugae("check data --json");
+  EXPECT_EQ(changed.code, kBadInput);
+  const auto problems = nlohmann::json::parse(changed.out).at("problems");
+  ASSERT_GE(problems.size(), 1u);
+  EXPECT_NE(problems[0].get<std::string>().find("data/truth/trajectory.txt"), std::string::npos)
+      << problems;
+}
+
+TEST_F(CommandLine, SimulateGoesOnAndSaysSoInJson) {
+  small_dataset();
+  const Outcome again = rugae(
+      "simulate --resolution coarse --camera tiny.yaml --trajectory 1 --frames 4 --out data "
+      "--json");
+  EXPECT_EQ(again.code, kDone);
+  const auto json = nlohmann::json::parse(again.out);
+  EXPECT_EQ(json.at("frames"), 4);
+  EXPECT_EQ(json.at("skipped"), 4);
+  const Outcome other = rugae(
+      "simulate --resolution coarse --camera tiny.yaml --trajectory 1 --frames 4 --seed 2 --out "
+      "data");
+  EXPECT_EQ(other.code, kBadInput);
+}
+
+TEST_F(CommandLine, FewerThanTwoFrames) {
+  small_dataset();
+  fs::create_directories(folder_ / "one");
+  fs::copy_file(folder_ / "data/observations/frames/000000.png", folder_ / "one/a.png");
+  expect_refused("reconstruct one --calibration data/observations/calibration.yaml --out est",
+                 "one: 1 usable frame, at least two are needed");
+  fs::create_directories(folder_ / "none");
+  const Outcome none =
+      rugae("reconstruct none --calibration data/observations/calibration.yaml --out est");
+  EXPECT_EQ(none.code, kBadInput);
+}
+
+TEST_F(CommandLine, TrajectoryThatWouldLeaveTheStomach) {
+  write("wide.yaml", "length_cm: 120\nclearance_mm: 90\n");
+  const Outcome outcome =
+      rugae("simulate --resolution coarse --trajectory wide.yaml --frames 4 --out out");
+  EXPECT_EQ(outcome.code, kBadInput);
+  EXPECT_TRUE(outcome.error.find("rugae: trajectory 'wide' would leave the stomach: ") !=
+              std::string::npos)
+      << outcome.error;
+}
+
+TEST_F(CommandLine, FailedGateExitsWithThree) {
+  write("tiny.yaml", kTinyCamera);
+  write("study.yaml",
+        "title: tiny\nresolution: coarse\nframes: 4\ncameras: [tiny.yaml]\ntrajectories: ['1']\n"
+        "methods: [paper]\ngates:\n  - {metric: tracking.tracked_share, above: 2, reason: cannot "
+        "be}\n");
+  const Outcome outcome = rugae("run study.yaml --out out");
+  EXPECT_EQ(outcome.code, kGateFailed) << outcome.error;
+  EXPECT_NE(outcome.error.find("gate failed: "), std::string::npos);
+}
+
+}  // namespace
+}  // namespace rugae
