@@ -2,9 +2,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
-#include <algorithm>
 #include <memory>
-#include <numeric>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -27,31 +25,18 @@ void use_callers_thread() {
 // the time, so they are stored as they are.
 constexpr const char* kCompression = "none";
 
+std::vector<std::string> channel_names(int channels) {
+  if (channels == 1) return {"Y"};
+  if (channels == 2) return {"x", "y"};
+  return {"x", "y", "z"};
+}
+
 OIIO::ImageSpec spec_of(const cv::Mat& image) {
   OIIO::ImageSpec spec(image.cols, image.rows, image.channels(), OIIO::TypeDesc::FLOAT);
-  if (image.channels() == 1) spec.channelnames = {"Y"};
-  if (image.channels() == 2) spec.channelnames = {"x", "y"};
-  if (image.channels() == 3) spec.channelnames = {"x", "y", "z"};
+  spec.channelnames = channel_names(image.channels());
   spec.attribute("compression", kCompression);
   spec.attribute("DateTime", "1970:01:01 00:00:00");  // otherwise the time of writing
   return spec;
-}
-
-// OpenImageIO brings channels into an order of its own (it takes a y for luminance and a z for
-// depth); ours is x y z.
-cv::Mat in_order_of_names(const cv::Mat& image, const std::vector<std::string>& names) {
-  if (std::ranges::is_sorted(names)) return image;
-  std::vector<int> order(names.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::ranges::sort(order, {}, [&names](int channel) { return names[channel]; });
-  cv::Mat sorted(image.size(), image.type());
-  std::vector<int> pairs;
-  for (std::size_t to = 0; to < order.size(); ++to) {
-    pairs.push_back(order[to]);
-    pairs.push_back(static_cast<int>(to));
-  }
-  cv::mixChannels(&image, 1, &sorted, 1, pairs.data(), order.size());
-  return sorted;
 }
 
 }  // namespace
@@ -88,14 +73,14 @@ cv::Mat read_exr(const fs::path& file) {
   }
   const OIIO::ImageSpec spec = in->spec();
   check(std::string_view(in->format_name()) == "openexr" && spec.format == OIIO::TypeDesc::FLOAT &&
-            spec.nchannels >= 1 && spec.nchannels <= 3,
-        "{}: {} channels of {} in {}, expected float32 OpenEXR of 1 to 3 channels", file.string(),
-        spec.nchannels, spec.format.c_str(), in->format_name());
+            spec.channelnames == channel_names(spec.nchannels),
+        "{}: channels {} of {} in {}, expected float32 OpenEXR with Y, or x y, or x y z",
+        file.string(), fmt::join(spec.channelnames, " "), spec.format.c_str(), in->format_name());
   cv::Mat image(spec.height, spec.width, CV_MAKETYPE(CV_32F, spec.nchannels));
   const bool read = in->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, image.data);
   if (!read) in->geterror();
   check(read, "{}: truncated or not an image", file.string());
-  return in_order_of_names(image, spec.channelnames);
+  return image;
 }
 
 }  // namespace rugae

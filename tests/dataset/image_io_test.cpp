@@ -1,5 +1,6 @@
 #include "dataset/image_io.h"
 
+#include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -12,6 +13,7 @@
 
 #include "core/files.h"
 #include "core/random.h"
+#include "dataset/image_whole.h"
 #include "tests/dataset/plane_dataset.h"
 
 namespace rugae {
@@ -162,6 +164,46 @@ TEST(ImageIo, ATruncatedFileIsNamed) {
     EXPECT_EQ(error_of([&] { read_exr(exr); }), exr.string() + ": truncated or not an image")
         << keep << " of " << size;
   }
+}
+
+// The decoders behind read_image may or may not notice; the check of wholeness always does.
+TEST(ImageIo, EveryCutOfAFileIsNoticedWithoutDecoding) {
+  const TemporaryFolder folder("whole");
+  const cv::Mat image = noise(CV_8UC3, 5);
+  for (const char* name : {"a.png", "a.jpg", "a.bmp"}) {
+    const fs::path file = folder.path() / name;
+    ASSERT_TRUE(cv::imwrite(file.string(), image));
+    const std::string bytes = read_text(file);
+    EXPECT_EQ(error_of([&] { check_image_is_whole("f", bytes); }), "no error") << name;
+    for (std::size_t keep = 0; keep < bytes.size(); ++keep)
+      ASSERT_EQ(error_of([&] { check_image_is_whole("f", bytes.substr(0, keep)); }),
+                "f: truncated or not an image")
+          << name << " cut to " << keep << " of " << bytes.size();
+  }
+}
+
+TEST(ImageIo, ADamagedPngIsToldByItsChecksum) {
+  const TemporaryFolder folder("crc");
+  const fs::path file = folder.path() / "a.png";
+  write_image(file, noise(CV_8UC3, 5));
+  flip_byte(file, fs::file_size(file) / 2);
+  // 8 bytes of signature, 25 of the IHDR chunk.
+  EXPECT_EQ(error_of([&] { read_image_bgr(file); }),
+            file.string() + ": damaged: the checksum of its IDAT chunk at byte 33 does not match");
+}
+
+TEST(ImageIo, AnExrOfOtherChannelsIsRefused) {
+  const TemporaryFolder folder("channels");
+  const fs::path file = folder.path() / "a.exr";
+  OIIO::ImageSpec spec(4, 3, 3, OIIO::TypeDesc::FLOAT);  // R G B
+  const auto out = OIIO::ImageOutput::create(file.string());
+  const std::vector<float> pixels(4 * 3 * 3, 1.0f);
+  ASSERT_TRUE(out->open(file.string(), spec) &&
+              out->write_image(OIIO::TypeDesc::FLOAT, pixels.data()) && out->close());
+  EXPECT_EQ(error_of([&] { read_exr(file); }),
+            file.string() +
+                ": channels R G B of float in openexr, expected float32 OpenEXR with Y, or x y, or "
+                "x y z");
 }
 
 TEST(ImageIo, AFileThatIsNoImageIsNamed) {

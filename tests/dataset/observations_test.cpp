@@ -1,6 +1,7 @@
 #include "dataset/observations.h"
 
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
 #include <opencv2/core.hpp>
 
@@ -39,6 +40,16 @@ TEST(Observations, NaturalOrder) {
   EXPECT_TRUE(natural_less("f01", "f1"));
   EXPECT_FALSE(natural_less("f1", "f1"));
   EXPECT_TRUE(natural_less("f99999999999999999998", "f99999999999999999999"));
+}
+
+// A strict total order, as sorting needs: exactly one of a < b, b < a, a == b; and transitive.
+RC_GTEST_PROP(Observations, NaturalOrderIsAnOrder, ()) {
+  const auto name = [] {
+    return *rc::gen::container<std::string>(rc::gen::element('a', 'b', '0', '1', '9', '.'));
+  };
+  const std::string a = name(), b = name(), c = name();
+  RC_ASSERT(natural_less(a, b) + natural_less(b, a) + (a == b) == 1);
+  if (natural_less(a, b) && natural_less(b, c)) RC_ASSERT(natural_less(a, c));
 }
 
 TEST(Observations, OfADatasetAndOfItsObservationsFolder) {

@@ -206,6 +206,23 @@ TEST(Writer, AFullDiskNamesTheFile) {
   EXPECT_FALSE(writer.has_frame(0));
 }
 
+TEST(Writer, AFrameWithoutOneOfItsFilesIsWrittenAgain) {
+  const TemporaryFolder folder("writer_lost");
+  const PlaneWorld world;
+  world.write(folder.path() / "d");
+  const DatasetWriter writer(folder.path() / "d", world.info());
+  const DatasetLayout& layout = writer.layout();
+  EXPECT_TRUE(writer.has_frame(4));  // the last frame has no flow
+  for (const fs::path& file :
+       {layout.frame(2), layout.depth(2), layout.normals(2), layout.flow(2), layout.masks(2)}) {
+    EXPECT_TRUE(writer.has_frame(2));
+    const std::string bytes = read_text(file);
+    fs::remove(file);
+    EXPECT_FALSE(writer.has_frame(2)) << file;
+    write_atomic(file, bytes);
+  }
+}
+
 TEST(Writer, AFrameThatWasNotWrittenIsNamed) {
   const TemporaryFolder folder("writer_gap");
   const PlaneWorld world(3);
