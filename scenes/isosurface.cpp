@@ -25,6 +25,7 @@ struct GridEdge {
   bool leaves;  // from inside to outside along the axis
 };
 struct BlockSurface {
+  bool ambiguous = false;
   std::vector<CellVertex> vertices;
   std::vector<GridEdge> edges;
 };
@@ -45,13 +46,30 @@ struct Grid {
   Vec3 corner(int x, int y, int z) const { return origin + cell_mm * Vec3(x, y, z); }
 };
 
+// A face whose diagonals have unlike signs is cut twice, and two corners alone at a diagonal's ends
+// are two sheets: one vertex for the cell would join what is apart. Corner bits: x, y, z.
+bool is_ambiguous(const bool inside[8]) {
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = 0; side < 2; ++side) {
+      const int u = 1 << (axis + 1) % 3, w = 1 << (axis + 2) % 3, base = side << axis;
+      if (inside[base] == inside[base | u | w] && inside[base | u] == inside[base | w] &&
+          inside[base] != inside[base | u])
+        return true;
+    }
+  int count = 0;
+  for (int c = 0; c < 8; ++c) count += inside[c];
+  if (count != 2 && count != 6) return false;
+  for (int c = 0; c < 4; ++c)
+    if (inside[c] == (count == 2) && inside[7 - c] == (count == 2)) return true;
+  return false;
+}
+
 BlockSurface surface_in_block(const DistanceField& field, const Grid& grid, const Vec3i& first) {
   BlockSurface out;
-  Vec3 gradient;
   const double half = 0.5 * kBlock * grid.cell_mm;
   const double reach = kSteepestField * std::sqrt(3.0) * half;
   const Vec3 centre = grid.corner(first.x(), first.y(), first.z()) + Vec3::Constant(half);
-  if (std::abs(field(centre, gradient)) > reach) return out;
+  if (std::abs(field(centre, nullptr)) > reach) return out;
 
   std::array<double, kCorners * kCorners * kCorners> value;
   const auto at = [&](int x, int y, int z) -> double& {
@@ -60,12 +78,16 @@ BlockSurface surface_in_block(const DistanceField& field, const Grid& grid, cons
   for (int z = 0; z < kCorners; ++z)
     for (int y = 0; y < kCorners; ++y)
       for (int x = 0; x < kCorners; ++x)
-        at(x, y, z) = field(grid.corner(first.x() + x, first.y() + y, first.z() + z), gradient);
+        at(x, y, z) = field(grid.corner(first.x() + x, first.y() + y, first.z() + z), nullptr);
 
   for (int z = 0; z < kBlock; ++z)
     for (int y = 0; y < kBlock; ++y)
       for (int x = 0; x < kBlock; ++x) {
         const std::int64_t cell = grid.key(first.x() + x, first.y() + y, first.z() + z);
+        bool inside[8];
+        for (int c = 0; c < 8; ++c)
+          inside[c] = at(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)) < 0.0;
+        out.ambiguous |= is_ambiguous(inside);
         // the vertex: the mean of the level's crossings with the cell's twelve edges
         Vec3 sum = Vec3::Zero();
         int crossings = 0;
@@ -117,7 +139,7 @@ void relax(TriangleMesh& mesh, const std::vector<std::array<int, 4>>& quads,
       Vec3 gradient;
       const int newton_steps = round == rounds ? 3 : 1;
       for (int step = 0; step < newton_steps; ++step) {
-        const double distance = field(p, gradient);
+        const double distance = field(p, &gradient);
         p -= (distance / std::max(gradient.squaredNorm(), 1e-4)) * gradient;
       }
       mesh.vertices[v] = p;
@@ -130,20 +152,31 @@ void relax(TriangleMesh& mesh, const std::vector<std::array<int, 4>>& quads,
 TriangleMesh isosurface(const DistanceField& field, const Eigen::AlignedBox3d& box, double cell_mm,
                         int rounds, const std::string& name) {
   Grid grid{box.min() - Vec3::Constant(cell_mm), cell_mm, {}};
-  for (int a = 0; a < 3; ++a)
+  for (int a = 0; a < 3; ++a)  // a cell more on both sides, and one for the shifts
     grid.blocks[a] =
-        static_cast<int>(std::ceil((box.sizes()[a] + 2.0 * cell_mm) / (kBlock * cell_mm)));
+        static_cast<int>(std::ceil((box.sizes()[a] + 3.0 * cell_mm) / (kBlock * cell_mm)));
   const std::size_t count =
       static_cast<std::size_t>(grid.blocks.x()) * grid.blocks.y() * grid.blocks.z();
   check(count < (std::size_t{1} << 27), "{}: {} mm is too fine for a wall of {:.0f} mm", name,
         cell_mm, box.sizes().maxCoeff());
   std::vector<BlockSurface> surfaces(count);
-  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    const int nx = grid.blocks.x(), ny = grid.blocks.y();
-    const Vec3i block(static_cast<int>(i % nx), static_cast<int>(i / nx % ny),
-                      static_cast<int>(i / nx / ny));
-    surfaces[i] = surface_in_block(field, grid, kBlock * block);
-  });
+  constexpr int kShifts = 12;
+  const Vec3 unshifted = grid.origin;
+  for (int shift = 0;; ++shift) {
+    check(shift < kShifts, "{}: parts of the wall lie closer than {:.1f} mm", name, 2.0 * cell_mm);
+    const auto part = [&](double step) { return shift * step - std::floor(shift * step); };
+    // multiples of the golden ratio and its like fill the cell evenly
+    grid.origin = unshifted - cell_mm * Vec3(part(0.819), part(0.671), part(0.549));
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+      const int nx = grid.blocks.x(), ny = grid.blocks.y();
+      const Vec3i block(static_cast<int>(i % nx), static_cast<int>(i / nx % ny),
+                        static_cast<int>(i / nx / ny));
+      surfaces[i] = surface_in_block(field, grid, kBlock * block);
+    });
+    if (std::none_of(surfaces.begin(), surfaces.end(),
+                     [](const BlockSurface& s) { return s.ambiguous; }))
+      break;
+  }
 
   TriangleMesh mesh;
   std::unordered_map<std::int64_t, int> vertex_of_cell;

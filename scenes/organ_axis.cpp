@@ -123,17 +123,18 @@ double OrganAxis::weigh(const Vec3& p, Weights& w) const {
   return least - softness_mm_ * (portable_log(w.sum) - log_overlap_);
 }
 
-double OrganAxis::distance_mm(const Vec3& p, Vec3& gradient) const {
+double OrganAxis::distance_mm(const Vec3& p, Vec3* gradient) const {
   Weights w;
   const double distance = weigh(p, w);
+  if (!gradient) return distance;
   const Vec3 metric(1.0, 1.0 / (depth_ * depth_), 1.0);
-  gradient.setZero();
+  Vec3 sum = Vec3::Zero();
   for (int n = 0; n < w.count; ++n) {
     const int i = w.near[n];
-    gradient += (w.value[i] / std::max(w.from_centre_mm[i], 1e-9)) *
-                (p - balls_[i].centre).cwiseProduct(metric);
+    sum += (w.value[i] / std::max(w.from_centre_mm[i], 1e-9)) *
+           (p - balls_[i].centre).cwiseProduct(metric);
   }
-  gradient /= w.sum;
+  *gradient = sum / w.sum;
   return distance;
 }
 

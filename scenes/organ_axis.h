@@ -36,8 +36,8 @@ class OrganAxis {
             const Vec3& pole);
 
   AxisPoint locate(const Vec3& p) const;
-  /// The distance and its gradient alone: cheaper than locate.
-  double distance_mm(const Vec3& p, Vec3& gradient) const;
+  /// The distance alone, and its gradient where one is asked for: cheaper than locate.
+  double distance_mm(const Vec3& p, Vec3* gradient = nullptr) const;
   double length_mm() const { return balls_.back().s_mm; }
   /// Arc length of the given node.
   double node_s_mm(std::size_t node) const { return node_s_mm_[node]; }

@@ -158,7 +158,7 @@ double Relief::rugae_mm(const Vec3& p, const AxisPoint& at) const {
 double Relief::areae_mm(const Vec3& p) const {
   if (!(options_.areae_depth_mm > 0.0)) return 0.0;
   const CellSample cell = cell_noise(p / options_.areae_size_mm, areae_seed_);
-  const double flat = smooth_step(0.0, 0.30, cell.second - cell.nearest);
+  const double flat = smooth_step(0.0, 0.24, cell.second - cell.nearest);
   return options_.areae_depth_mm * (flat - 1.0);
 }
 

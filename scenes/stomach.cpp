@@ -86,19 +86,19 @@ StomachShape::StomachShape(double scale)
       oesophagus_(scaled(std::begin(kOesophagus), std::end(kOesophagus), scale), 3.0 * scale,
                   2.0 * scale, 1.0, Vec3::UnitY()) {}
 
-double StomachShape::distance_mm(const Vec3& p, Vec3& gradient) const {
+double StomachShape::distance_mm(const Vec3& p, Vec3* gradient) const {
   Vec3 g0, g1;
-  const double d0 = axis_.distance_mm(p, g0), d1 = oesophagus_.distance_mm(p, g1);
+  const double d0 = axis_.distance_mm(p, gradient ? &g0 : nullptr);
+  const double d1 = oesophagus_.distance_mm(p, gradient ? &g1 : nullptr);
   // smooth minimum of the two: -k ln(exp(-d0/k) + exp(-d1/k))
   const double k = 3.0 * scale_, least = std::min(d0, d1);
   const double w0 = portable_exp((least - d0) / k), w1 = portable_exp((least - d1) / k);
-  gradient = (w0 * g0 + w1 * g1) / (w0 + w1);
+  if (gradient) *gradient = (w0 * g0 + w1 * g1) / (w0 + w1);
   return least - k * portable_log(w0 + w1);
 }
 
 Region StomachShape::region(const Vec3& p, const AxisPoint& at) const {
-  Vec3 gradient;
-  const double stub = oesophagus_.distance_mm(p, gradient);
+  const double stub = oesophagus_.distance_mm(p);
   if (stub < at.distance_mm - 4.0 * scale_) return Region::oesophagus;
   if (stub < 15.0 * scale_ && at.s_mm < axis_.node_s_mm(kBodyNode)) return Region::cardia;
   if (at.s_mm > axis_.node_s_mm(kDuodenumNode)) return Region::duodenum;
@@ -130,14 +130,14 @@ StomachWall make_stomach(const StomachOptions& options, std::uint64_t seed, doub
   const Relief relief(options.relief, shape.fold_zone(), shape.axis(), seed);
   constexpr int kRelaxRounds = 6;
   StomachWall wall;
-  wall.mesh = isosurface([&](const Vec3& p, Vec3& g) { return shape.distance_mm(p, g); },
+  wall.mesh = isosurface([&](const Vec3& p, Vec3* g) { return shape.distance_mm(p, g); },
                          shape.box(), cell_mm, kRelaxRounds, "stomach");
   auto& vertices = wall.mesh.vertices;
   wall.regions.resize(vertices.size());
   tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t v) {
     const Vec3 p = vertices[v];
     Vec3 gradient;
-    shape.distance_mm(p, gradient);
+    shape.distance_mm(p, &gradient);
     const AxisPoint at = shape.locate(p);
     wall.regions[v] = shape.region(p, at);
     vertices[v] = p - relief.height_mm(p, at) * gradient.normalized();

@@ -20,7 +20,7 @@ struct StomachOptions {
 class StomachShape {
  public:
   explicit StomachShape(double scale);
-  double distance_mm(const Vec3& p, Vec3& gradient) const;
+  double distance_mm(const Vec3& p, Vec3* gradient = nullptr) const;
   /// Coordinates along and around the main axis, fundus to duodenum.
   AxisPoint locate(const Vec3& p) const { return axis_.locate(p); }
   Region region(const Vec3& p, const AxisPoint& at) const;
