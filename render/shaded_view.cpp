@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <vector>
 
 #include "core/check.h"
 #include "core/units.h"
@@ -17,11 +17,10 @@ namespace {
 constexpr float kAmbient = 0.25f;
 constexpr double kStepPast_mm = 1e-4;  // beyond a triangle that is left out
 
-// Colour of one ray, in sRGB.
+// Colour of one ray with its first hit, in sRGB.
 Vec3f look(const TriangleMesh& mesh, const Raycaster& raycaster, const Vec3& eye, const Vec3& ray,
-           const ShadedViewOptions& options) {
+           Hit hit, const ShadedViewOptions& options) {
   Vec3 from = eye;
-  Hit hit = raycaster.intersect(from, ray);
   constexpr int kMostLayers = 64;
   for (int layer = 0; options.cull_front && hit.met() && layer < kMostLayers; ++layer) {
     if (triangle_normal(mesh, hit.triangle).dot(ray) > 0.0) break;
@@ -49,18 +48,22 @@ cv::Mat shaded_view(const TriangleMesh& mesh, const Rigid3& cam_from_world, cons
   const LensProjector projector(lens);
   const Rigid3 world_from_cam = cam_from_world.inverse();
   cv::Mat picture(lens.height, lens.width, CV_8UC3);
+  const int per_pixel = options.samples * options.samples;
   tbb::parallel_for(0, lens.height, [&](int y) {
+    std::vector<Vec3> rays;  // zero where the lens sees nothing
+    for (int x = 0; x < lens.width; ++x)
+      for (int s = 0; s < per_pixel; ++s) {
+        const auto ray = projector.unproject({x + (s % options.samples + 0.5) / options.samples,
+                                              y + (s / options.samples + 0.5) / options.samples});
+        rays.push_back(ray ? Vec3(world_from_cam.rotation * *ray) : Vec3::Zero());
+      }
+    std::vector<Hit> hits(rays.size());
+    raycaster.intersect(world_from_cam.translation, rays, hits);
     for (int x = 0; x < lens.width; ++x) {
       Vec3f sum = Vec3f::Zero();
-      for (int s = 0; s < options.samples * options.samples; ++s) {
-        const Vec2 pixel(x + (s % options.samples + 0.5) / options.samples,
-                         y + (s / options.samples + 0.5) / options.samples);
-        const auto ray = projector.unproject(pixel);
-        sum += ray ? look(mesh, raycaster, world_from_cam.translation,
-                          world_from_cam.rotation * *ray, options)
-                   : options.background_srgb;
-      }
-      sum *= 255.0f / static_cast<float>(options.samples * options.samples);
+      for (int i = x * per_pixel; i < (x + 1) * per_pixel; ++i)
+        sum += look(mesh, raycaster, world_from_cam.translation, rays[i], hits[i], options);
+      sum *= 255.0f / static_cast<float>(per_pixel);
       for (int c = 0; c < 3; ++c)
         picture.at<cv::Vec3b>(y, x)[2 - c] =
             static_cast<unsigned char>(std::clamp(sum[c] + 0.5f, 0.0f, 255.0f));

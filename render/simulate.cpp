@@ -31,30 +31,16 @@ struct Path {
   double length_mm = 0.0, min_clearance_mm = 0.0;
 };
 
-// A user's track resampled at equal steps of its own duration.
-PoseTrack resampled(const PoseTrack& track, int frames, double fps) {
-  PoseTrack result;
-  const double first_s = track.front().time_s, last_s = track.back().time_s;
-  for (int i = 0; i < frames; ++i) {
-    const double time_s =
-        i + 1 == frames ? last_s : first_s + (last_s - first_s) * i / (frames - 1);
-    result.push_back({i / fps, *interpolate(track, time_s)});
-  }
-  return result;
+// As many frames as the paper has for this camera and trajectory, or as the track in a file has
+// poses; a path that is neither is taken for as long as the paper's first.
+int default_frames(const TrajectoryOptions& trajectory, const Camera& camera) {
+  if (!trajectory.file.empty()) return static_cast<int>(read_tum(trajectory.file).size());
+  return frames_of_trajectory(camera, std::max(1, trajectory.paper_number));
 }
 
 Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajectory,
                const Camera& camera, const TriangleMesh& wall) {
-  const int in_paper = std::max(1, trajectory.paper_number);
-  const int frames = options.frames > 0 ? options.frames : frames_of_trajectory(camera, in_paper);
-  if (!trajectory.file.empty()) {
-    PoseTrack track = read_tum(trajectory.file);
-    check(track.size() >= 2, "{}: {} poses, expected at least 2", trajectory.file.string(),
-          track.size());
-    check_inside(wall, track, trajectory.clearance_mm, trajectory.name);
-    if (options.frames > 0) track = resampled(track, frames, camera.sensor.fps);
-    return {track, length_mm(track), 0.0};
-  }
+  const int frames = options.frames > 0 ? options.frames : default_frames(trajectory, camera);
   const PlannedPath path = plan_path(wall, trajectory, options.seed);
   return {sample_path(path, frames, camera.sensor.fps), path.length_mm(), path.min_clearance_mm()};
 }

@@ -14,7 +14,7 @@ struct SimulateOptions {
   std::string camera = "misumi-v5506";  // preset or YAML
   std::string trajectory = "1";         // preset or YAML
   std::string resolution = "medium";
-  int frames = 0;       // 0: as many as in the paper for this camera and trajectory
+  int frames = 0;       // 0: as many as in the paper for this camera and trajectory, or in the file
   int only_frame = -1;  // replays a single frame
   std::uint64_t seed = 1;
   bool noise = true;  // shot and read noise
@@ -27,7 +27,7 @@ struct SimulateOptions {
 
 struct SimulateResult {
   int frames = 0, skipped = 0;  // skipped: found finished from an earlier run
-  double path_length_mm = 0.0, min_clearance_mm = 0.0;  // 0 clearance: a track from a file
+  double path_length_mm = 0.0, min_clearance_mm = 0.0;
   // Processor seconds of all threads over the frame loop. Writing is what the system spends while
   // files are written; encoding the rest of that stage.
   double trace_s = 0.0, shade_s = 0.0, label_s = 0.0, sensor_s = 0.0, encode_s = 0.0, write_s = 0.0;

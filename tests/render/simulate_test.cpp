@@ -1,0 +1,237 @@
+#include "render/simulate.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <map>
+#include <thread>
+
+#include "core/check.h"
+#include "core/files.h"
+#include "core/mesh_io.h"
+#include "dataset/check_dataset.h"
+#include "dataset/layout.h"
+#include "dataset/observations.h"
+#include "dataset/truth.h"
+#include "tests/render/walls.h"
+
+namespace rugae {
+namespace {
+namespace fs = std::filesystem;
+
+// A small world in a folder of its own: a bumpy cavity, a camera, a track of seven poses.
+class Simulate : public testing::Test {
+ protected:
+  void SetUp() override {
+    // A process started by a death test works in the folder of the one that started it.
+    const char* given = std::getenv("RUGAE_SIMULATE_TEST");
+    root_ = given ? fs::path(given)
+                  : fs::temp_directory_path() / fmt::format("rugae_simulate_{}", getpid());
+    setenv("RUGAE_SIMULATE_TEST", root_.c_str(), 1);
+    fs::remove_all(root_);
+    make_folder(root_);
+    write_ply(root_ / "wall.ply", test::sphere_mesh(3, 60.0, [](const Vec3& d) {
+                return 1.0 + 0.1 * std::sin(5.0 * d.x()) * std::cos(4.0 * d.y());
+              }));
+    write_atomic(root_ / "scene.yaml",
+                 "kind: mesh\nmesh: wall.ply\ntarget_edge_mm: 4\nwith_relief: false\n");
+    write_atomic(root_ / "camera.yaml",
+                 "name: small\nframes_in_paper: 6\ndiameter_mm: 4\n"
+                 "lens: {model: brown_conrady, width: 64, height: 48, horizontal_fov_deg: 90, "
+                 "k1: -0.1}\n"
+                 "vignetting: {cos4: true}\n"
+                 "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 9000, "
+                 "read_noise_e: 5, shutter: global}\n");
+    PoseTrack track;
+    for (int i = 0; i < 7; ++i)
+      track.push_back({i / 30.0, Rigid3(Quat(Eigen::AngleAxisd(0.05 * i, Vec3::UnitY())),
+                                        Vec3(3.0 * i - 9.0, 0.7 * i * i - 10.0, 1.5 * i))});
+    write_atomic(root_ / "track.txt", tum_text(track));
+    write_atomic(root_ / "path.yaml", "file: track.txt\nclearance_mm: 5\n");
+    options_.scene = (root_ / "scene.yaml").string();
+    options_.camera = (root_ / "camera.yaml").string();
+    options_.trajectory = (root_ / "path.yaml").string();
+    options_.resolution = "coarse";
+  }
+  void TearDown() override {
+    fs::remove_all(root_);
+    unsetenv("RUGAE_SIMULATE_TEST");
+  }
+
+  SimulateResult run(const std::string& folder, const SimulateOptions& options) {
+    Progress progress(Progress::Output::silent);
+    return simulate(options, root_ / folder, progress);
+  }
+  SimulateResult run(const std::string& folder) { return run(folder, options_); }
+
+  // Every file below the folder, by its bytes.
+  std::map<std::string, std::string> contents(const std::string& folder) const {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(root_ / folder))
+      if (entry.is_regular_file())
+        files[fs::relative(entry.path(), root_ / folder).string()] = read_text(entry.path());
+    return files;
+  }
+  void expect_same(const std::string& a, const std::string& b) const {
+    const auto in_a = contents(a), in_b = contents(b);
+    EXPECT_GT(in_a.size(), 10u);
+    for (const auto& [file, bytes] : in_a) {
+      ASSERT_TRUE(in_b.contains(file)) << file;
+      EXPECT_TRUE(in_b.at(file) == bytes) << file;
+    }
+    EXPECT_EQ(in_a.size(), in_b.size());
+  }
+
+  fs::path root_;
+  SimulateOptions options_;
+};
+
+TEST_F(Simulate, WritesASoundDataset) {
+  const SimulateResult result = run("a");
+  EXPECT_EQ(result.frames, 7);
+  EXPECT_EQ(result.skipped, 0);
+  EXPECT_GT(result.path_length_mm, 10.0);
+  EXPECT_GT(result.min_clearance_mm, 5.0);
+  EXPECT_GT(result.trace_s + result.shade_s + result.label_s + result.sensor_s + result.encode_s,
+            0.0);
+  const DatasetCheck found = check_dataset(root_ / "a");
+  EXPECT_EQ(found.problems, std::vector<std::string>{});
+  EXPECT_EQ(found.frames, 7);
+  const Truth truth = Truth::open(root_ / "a");
+  EXPECT_EQ(truth.size(), 7);
+  const Observations seen = Observations::open(root_ / "a");
+  EXPECT_EQ(seen.size(), 7);
+  EXPECT_EQ(seen.image(3).cols, 64);
+}
+
+TEST_F(Simulate, TwoRunsAndAnyThreadsWriteTheSameBytes) {
+  options_.threads = 1;
+  run("one");
+  run("again");
+  options_.threads = 2;
+  run("two");
+  expect_same("one", "again");
+  expect_same("one", "two");
+}
+
+TEST_F(Simulate, AKilledRunGoesOn) {
+  run("whole");
+  // As after a kill: three frames are there, a fourth was begun.
+  run("killed");
+  const DatasetLayout layout{root_ / "killed"};
+  fs::remove(layout.manifest());
+  fs::remove(layout.frame_list());
+  for (int i = 3; i < 7; ++i) fs::remove(layout.frame(i));
+  const SimulateResult result = run("killed");
+  EXPECT_EQ(result.frames + result.skipped, 7);
+  EXPECT_GE(result.frames, 4);
+  expect_same("whole", "killed");
+
+  const SimulateResult nothing_left = run("killed");
+  EXPECT_EQ(nothing_left.frames, 0);
+  EXPECT_EQ(nothing_left.skipped, 7);
+  expect_same("whole", "killed");
+}
+
+// A process of its own, killed for good in the middle of its work.
+TEST_F(Simulate, AProcessKilledInTheMiddleGoesOn) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  options_.frames = 60;
+  EXPECT_EXIT(
+      {
+        const fs::path started = DatasetLayout{root_ / "killed"}.frame(4);
+        std::jthread killer([started] {
+          while (!fs::exists(started)) std::this_thread::yield();
+          kill(getpid(), SIGKILL);
+        });
+        run("killed");
+        // Too late: never reached unless sixty frames are written faster than one is noticed.
+        _exit(0);
+      },
+      testing::KilledBySignal(SIGKILL), "");
+  EXPECT_FALSE(fs::exists(DatasetLayout{root_ / "killed"}.manifest()));
+  const SimulateResult result = run("killed");
+  EXPECT_GT(result.skipped, 0);
+  EXPECT_GT(result.frames, 0);
+  run("whole");
+  expect_same("whole", "killed");
+}
+
+TEST_F(Simulate, OnlyFrameIsThatFrameOfTheWholeRun) {
+  run("whole");
+  options_.only_frame = 4;
+  EXPECT_EQ(run("alone").frames, 1);
+  const DatasetLayout whole{root_ / "whole"}, alone{root_ / "alone"};
+  EXPECT_EQ(read_text(whole.frame(4)), read_text(alone.frame(4)));
+  EXPECT_EQ(read_text(whole.depth(4)), read_text(alone.depth(4)));
+  EXPECT_EQ(read_text(whole.flow(4)), read_text(alone.flow(4)));
+  EXPECT_FALSE(fs::exists(alone.frame(3)));
+  EXPECT_FALSE(fs::exists(alone.manifest()));
+}
+
+TEST_F(Simulate, SwitchesActAlone) {
+  options_.frames = 2;
+  run("noisy");
+  options_.noise = false;
+  run("clean");
+  options_.vignetting = false;
+  run("flat");
+  options_.labels = false;
+  run("bare");
+  const DatasetLayout noisy{root_ / "noisy"}, clean{root_ / "clean"}, flat{root_ / "flat"},
+      bare{root_ / "bare"};
+  EXPECT_NE(read_text(noisy.frame(0)), read_text(clean.frame(0)));
+  EXPECT_NE(read_text(clean.frame(0)), read_text(flat.frame(0)));
+  EXPECT_EQ(read_text(flat.frame(0)), read_text(bare.frame(0)));
+  EXPECT_EQ(read_text(noisy.depth(0)), read_text(flat.depth(0)));
+  EXPECT_FALSE(fs::exists(bare.depth(0)));
+}
+
+TEST_F(Simulate, SeedsChangeTheNoise) {
+  options_.frames = 2;
+  run("one");
+  options_.seed = 2;
+  run("two");
+  EXPECT_NE(read_text(DatasetLayout{root_ / "one"}.frame(0)),
+            read_text(DatasetLayout{root_ / "two"}.frame(0)));
+}
+
+TEST_F(Simulate, SaysWhatIsWrong) {
+  const auto text_of = [&](const SimulateOptions& options, const fs::path& out) {
+    Progress progress(Progress::Output::silent);
+    try {
+      simulate(options, out, progress);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing");
+  };
+  SimulateOptions options = options_;
+  options.frames = 1;
+  EXPECT_EQ(text_of(options, root_ / "x"), "frames is 1, expected at least 2");
+  options = options_;
+  options.only_frame = 7;
+  EXPECT_EQ(text_of(options, root_ / "x"), "only-frame is 7, but there are 7 frames");
+  options = options_;
+  options.threads = -1;
+  EXPECT_EQ(text_of(options, root_ / "x"), "threads is -1, expected at least 0");
+  options = options_;
+  options.camera = "misumi-v550";
+  EXPECT_EQ(text_of(options, root_ / "x"),
+            "camera 'misumi-v550': no such preset; did you mean 'misumi-v5506'?");
+  EXPECT_FALSE(fs::exists(root_ / "x"));  // nothing is begun that cannot be finished
+  // A file stands where the folder should be.
+  write_atomic(root_ / "taken", "");
+  EXPECT_NE(text_of(options_, root_ / "taken").find("taken"), std::string::npos);
+  // Another dataset is there already.
+  run("a");
+  options = options_;
+  options.seed = 2;
+  EXPECT_NE(text_of(options, root_ / "a").find("holds another dataset (seed is 1, now 2)"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace rugae
