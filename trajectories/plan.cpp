@@ -89,7 +89,7 @@ class LengthFit {
          size.loops += more_loops(size.loops)) {
       size.loop_mm = widest;
       if (length(size) < target_mm_) continue;
-      return solve(size, size.loop_mm, kSmallestLoopMm, widest);
+      return solve(size, size.loop_mm, 0.0, widest);
     }
     return {size, false};
   }

@@ -169,6 +169,22 @@ TEST(Plan, TheFullMatrixHas17010Frames) {
   EXPECT_EQ(frames, 17010u);
 }
 
+// Where there is little room, the clearance decides the path: it is kept, and nearly used up.
+TEST(Plan, ClearanceIsKeptWhereItIsTight) {
+  for (const auto& [radius_mm, clearance_mm] : {std::pair(32.0, 24.0), std::pair(16.0, 9.0)}) {
+    const TriangleMesh wall = bent_tube(radius_mm, 75.0, rad_from_deg(110.0));
+    const ClosestPoint closest(wall);
+    TrajectoryOptions options = load_trajectory("4");
+    options.clearance_mm = clearance_mm;
+    const PlannedPath path = plan_path(wall, options, 1);
+    double least = 1e9;
+    for (const TimedPose& pose : sample_path(path, 6000, kFps))
+      least = std::min(least, -closest.signed_distance_mm(pose.world_from_camera.translation));
+    EXPECT_GE(least, clearance_mm - 0.125);  // half the planner's step
+    EXPECT_LE(least, clearance_mm + 2.0);
+  }
+}
+
 TEST(Plan, ShortPathsFitToo) {
   TrajectoryOptions options = load_trajectory("3");
   for (const double length_cm : {1.0, 5.0, 20.0, 60.0, 400.0}) {
