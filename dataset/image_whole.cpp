@@ -64,7 +64,7 @@ bool bmp_is_whole(std::string_view bytes) {
   const std::uint64_t bits = byte_at(bytes, 28) | byte_at(bytes, 29) << 8;
   if (little_endian(bytes, 30) != 0) return little_endian(bytes, 2) <= bytes.size();  // run lengths
   const std::uint64_t row = (width * bits + 31) / 32 * 4;
-  return width > 0 && height > 0 && offset + row * height <= bytes.size();
+  return row > 0 && height > 0 && offset <= bytes.size() && height <= (bytes.size() - offset) / row;
 }
 
 }  // namespace

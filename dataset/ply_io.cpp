@@ -53,6 +53,8 @@ std::optional<Header> parse_header(std::string_view bytes) {
   if (!header.precise && !take("float x;float y;float z;")) return std::nullopt;
   header.normals = take("float nx;float ny;float nz;");
   header.colors = take("uchar red;uchar green;uchar blue;");
+  // Counts beyond the file's size would overflow the sums below.
+  if (header.vertices > bytes.size() || header.triangles > bytes.size()) return std::nullopt;
   const bool faces = take("list uchar int vertex_indices;");
   if (!binary || !properties.empty() || (!faces && header.triangles > 0)) return std::nullopt;
   return header;

@@ -155,6 +155,16 @@ TEST_F(CheckDataset, PosesThatNeverMoveAreNamed) {
   EXPECT_TRUE(found[1].starts_with(text(layout_.flow(0)) + ": disagrees with depth and pose"));
 }
 
+TEST_F(CheckDataset, ACameraThatOnlyShiftsOrOnlyTurnsMoves) {
+  PlaneWorld shifts = world_, turns = world_;
+  for (TimedPose& pose : shifts.track) pose.world_from_camera.rotation = Quat::Identity();
+  for (TimedPose& pose : turns.track) pose.world_from_camera.translation.setZero();
+  shifts.write(folder_.path() / "shifts");
+  turns.write(folder_.path() / "turns");
+  EXPECT_EQ(check_dataset(folder_.path() / "shifts").problems, Problems{});
+  EXPECT_EQ(check_dataset(folder_.path() / "turns").problems, Problems{});
+}
+
 TEST_F(CheckDataset, TooFewPosesAreNamed) {
   PoseTrack track = world_.track;
   track.pop_back();
@@ -237,6 +247,19 @@ TEST_F(CheckDataset, ASmallErrorOfTheFlowIsFound) {
                             ": disagrees with depth and pose: median 0.02 px, worst 0.02 px over " +
                             found.at(0).substr(found.at(0).find("over ") + 5, 3) +
                             " sampled pixels, expected at most 0.001 and 0.01 px"});
+}
+
+TEST_F(CheckDataset, AnErrorBelowTheLargestAllowedButEverywhereIsFound) {
+  rewrite_flows([&](int i) {
+    cv::Mat flow = world_.truth(i).flow_px;
+    cv::add(flow, cv::Scalar(0.0, 0.005), flow);
+    return flow;
+  });
+  const Problems found = problems();
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].starts_with(text(layout_.flow(0)) +
+                                   ": disagrees with depth and pose: median 0.005 px, worst 0.005"))
+      << found[0];
 }
 
 TEST_F(CheckDataset, ADepthWithoutItsMaskIsNamed) {

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "core/files.h"
+#include "core/mesh_io.h"
+#include "dataset/ply_io.h"
 #include "tests/dataset/plane_dataset.h"
 
 namespace rugae {
@@ -113,6 +115,24 @@ TEST(Estimate, ListAndTrajectoryMustAgree) {
   EXPECT_EQ(error_of([&] { read_estimate(folder.path()); }),
             layout.frame_list().string() +
                 ":4: state 'floating', expected one of: lost, keyframe, resected");
+}
+
+// Whatever a damaged byte does to a PLY, it is read or refused, and never read beyond its end.
+TEST(Estimate, EveryDamagedByteOfAMapIsSurvived) {
+  const TemporaryFolder folder("estimate_damage");
+  const fs::path file = folder.path() / "map.ply";
+  write_ply(file, example().map);
+  const std::string whole = read_text(file);
+  int refused = 0;
+  for (std::size_t at = 0; at < whole.size(); ++at) {
+    std::string bytes = whole;
+    bytes[at] = static_cast<char>(bytes[at] ^ 0x09);  // turns digits into other digits
+    write_atomic(file, bytes);
+    const std::string error = error_of([&] { read_ply(file); });
+    EXPECT_TRUE(error == "no error" || error.starts_with(file.string() + ": ")) << error;
+    refused += error != "no error";
+  }
+  EXPECT_GT(refused, 150);  // nearly all of the header of about 300 bytes
 }
 
 TEST(Estimate, ATruncatedMapIsNamed) {

@@ -182,6 +182,21 @@ TEST(ImageIo, EveryCutOfAFileIsNoticedWithoutDecoding) {
   }
 }
 
+TEST(ImageIo, TheEndOfAThumbnailIsNotTheEndOfAJpeg) {
+  const TemporaryFolder folder("thumbnail");
+  const fs::path file = folder.path() / "a.jpg";
+  write_image(file, noise(CV_8UC3, 5));
+  const std::string whole = read_text(file);
+  // A comment segment behind the start marker that holds a whole (empty) JPEG, as EXIF data do.
+  const std::string with_thumbnail = whole.substr(0, 2) + "\xff\xfe" + std::string("\0\x06", 2) +
+                                     "\xff\xd8\xff\xd9" + whole.substr(2);
+  EXPECT_EQ(error_of([&] { check_image_is_whole("f", with_thumbnail); }), "no error");
+  EXPECT_EQ(error_of([&] {
+              check_image_is_whole("f", with_thumbnail.substr(0, with_thumbnail.size() / 2));
+            }),
+            "f: truncated or not an image");
+}
+
 TEST(ImageIo, ADamagedPngIsToldByItsChecksum) {
   const TemporaryFolder folder("crc");
   const fs::path file = folder.path() / "a.png";

@@ -5,11 +5,13 @@
 #include <tbb/parallel_for.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <map>
 #include <opencv2/core.hpp>
+#include <sstream>
 
 #include "core/files.h"
 #include "dataset/check_dataset.h"
@@ -123,6 +125,11 @@ TEST(Writer, TheManifestIsReadBySha256sum) {
   const std::string command = "cd '" + (folder.path() / "d").string() +
                               "' && sha256sum --strict --status -c manifest.sha256";
   EXPECT_EQ(std::system(command.c_str()), 0);
+  std::istringstream manifest(read_text(folder.path() / "d" / "manifest.sha256"));
+  std::vector<std::string> files;
+  for (std::string hash, file; manifest >> hash >> file;) files.push_back(file);
+  EXPECT_EQ(files.size(), 30u);
+  EXPECT_TRUE(std::ranges::is_sorted(files));  // whatever the order of the folders on disk
   write_atomic(folder.path() / "d" / "observations" / "frames.csv", "changed");
   EXPECT_NE(std::system(command.c_str()), 0);
 }
