@@ -110,14 +110,14 @@ std::array<float, 3> ElectronNoise::operator()(const std::array<float, 3>& mean_
 SensorModel::SensorModel(const Sensor& sensor, const SensorOptions& options)
     : sensor_(sensor),
       options_(options),
-      noise_(sensor.read_noise_e * options.read_noise_factor, options.seed),
-      display_(static_cast<std::size_t>(1) << sensor.bit_depth) {
+      noise_(sensor.read_noise_e * options.read_noise_factor, options.seed) {
   check(sensor.bit_depth >= 8 && sensor.bit_depth <= 16, "sensor: {} bits, expected 8 to 16",
         sensor.bit_depth);
   check(sensor.full_well_e > 0.0 && sensor.read_noise_e >= 0.0 && sensor.fps > 0.0,
         "sensor: full well {} e, read noise {} e, {} frames/s; expected above 0, at least 0, above "
         "0",
         sensor.full_well_e, sensor.read_noise_e, sensor.fps);
+  display_.resize(static_cast<std::size_t>(1) << sensor.bit_depth);
   for (int dn = 0; dn <= adc_top(); ++dn)
     display_[dn] = static_cast<unsigned char>(
         std::floor(255.0 * srgb_from_linear(static_cast<double>(dn) / adc_top()) + 0.5));

@@ -28,7 +28,7 @@ Vec3f at(const cv::Mat& image, int x, int y) { return image.ptr<Vec3f>(y)[x]; }
 TEST(Radiance, LightInASphere) {
   constexpr double kRadius_mm = 25.0;
   constexpr float kAlbedo = 0.37f;
-  // Seven levels: the facets lie at most 1.2e-5 of the radius inside the sphere.
+  // Seven levels: the facets lie at most 1.7e-5 of the radius inside the sphere.
   const cv::Mat image =
       radiance_of(test::sphere_mesh(7, kRadius_mm), lambert(kAlbedo), small_camera());
   const double expected = kAlbedo / (kPi * kRadius_mm * kRadius_mm);

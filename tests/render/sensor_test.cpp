@@ -41,12 +41,11 @@ TEST(Sensor, AdcRoundsAndClips) {
 }
 
 // IEC 61966-2-1: the forward curve of the display value must give back the ADC's share to half a
-// step of 8 bits; and points everyone knows.
+// step of 8 bits.
 TEST(Sensor, DisplayCurveIsSrgb) {
   const SensorModel sensor(kSensor, {});
   EXPECT_EQ(sensor.display(0), 0);
   EXPECT_EQ(sensor.display(1023), 255);
-  EXPECT_EQ(sensor.display(219), 127);  // 21.4 % is middle grey
   for (int number = 0; number <= 1023; ++number) {
     const auto linear_of = [](double encoded) {
       return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
@@ -180,14 +179,14 @@ TEST(Sensor, ExposureFollowsTheLight) {
 TEST(Sensor, ExposureSparesTheHighlights) {
   const SensorModel sensor(kSensor, {.noise = false});
   cv::Mat light = gray(1e-3f, 100, 100);
-  for (int y = 0; y < 10; ++y)  // a tenth of the frame is forty times as bright
-    for (int x = 0; x < 100; ++x) light.ptr<Vec3f>(y)[x] *= 40.0f;
+  for (int y = 0; y < 10; ++y)  // a tenth of the frame is up to forty times as bright
+    for (int x = 0; x < 100; ++x) light.ptr<Vec3f>(y)[x] *= 0.04f * static_cast<float>(100 * y + x);
   const Exposure exposure = sensor.expose(light);
   cv::Mat masks = no_masks(light);
   sensor.digitise(light, exposure, 0, masks);
   int saturated = 0;
   for (int i = 0; i < 10000; ++i) saturated += masks.data[i] != 0;
-  EXPECT_LE(saturated, static_cast<int>(SensorModel::kBrightShare * 10000) + 1);
+  EXPECT_NEAR(saturated, SensorModel::kBrightShare * 10000, 20);
 }
 
 TEST(Sensor, DarknessTakesTheLongestExposure) {

@@ -219,8 +219,9 @@ TEST_F(Simulate, SaysWhatIsWrong) {
   EXPECT_EQ(text_of(options, root_ / "x"), "threads is -1, expected at least 0");
   options = options_;
   options.camera = "misumi-v550";
-  EXPECT_EQ(text_of(options, root_ / "x"),
-            "camera 'misumi-v550': no such preset; did you mean 'misumi-v5506'?");
+  EXPECT_TRUE(text_of(options, root_ / "x")
+                  .starts_with("camera 'misumi-v550': no such preset; did you mean "
+                               "'misumi-v5506'?"));
   EXPECT_FALSE(fs::exists(root_ / "x"));  // nothing is begun that cannot be finished
   // A file stands where the folder should be.
   write_atomic(root_ / "taken", "");
