@@ -2,14 +2,13 @@
 // Noise computed once on a small periodic grid and read back by trilinear interpolation: the price
 // of a fetch does not depend on what was computed. Four channels of 16 bits, 2 MB.
 
-#include <emmintrin.h>
-
 #include <array>
 #include <cstdint>
 #include <functional>
 #include <vector>
 
 #include "core/types.h"
+#include "scenes/lanes.h"
 
 namespace rugae {
 
@@ -23,44 +22,41 @@ class NoiseTile {
   /// after kCells. Channel c is stored in [-range[c], range[c]].
   NoiseTile(const std::function<Channels(const Vec3&)>& value, const Channels& range);
 
-  /// The four channels at `cells` (within 1e5 cells of 0). Across x in 15-bit integers, across y
-  /// and z in single precision.
-  Channels fetch(const Vec3f& cells) const {
+  /// The four channels at `cells` (within 1e5 cells of 0; the fourth lane is not used). Across x in
+  /// 15-bit integers, across y and z in single precision.
+  Lanes fetch(Lanes cells) const {
     constexpr float kScale = static_cast<float>(kVoxels) / kCells;
-    const __m128 p =
-        _mm_mul_ps(_mm_setr_ps(cells.x(), cells.y(), cells.z(), 0.0f), _mm_set1_ps(kScale));
+    const Lanes p = cells * splat(kScale);
     // floor and fraction; truncation rounds negative numbers up, so those step down by one
     __m128i whole = _mm_cvttps_epi32(p);
-    __m128 fraction = _mm_sub_ps(p, _mm_cvtepi32_ps(whole));
-    const __m128 below = _mm_cmplt_ps(fraction, _mm_setzero_ps());
+    Lanes fraction = p - _mm_cvtepi32_ps(whole);
+    const Lanes below = _mm_cmplt_ps(fraction, _mm_setzero_ps());
     whole = _mm_add_epi32(whole, _mm_castps_si128(below));
-    fraction = _mm_add_ps(fraction, _mm_and_ps(below, _mm_set1_ps(1.0f)));
+    fraction = fraction + _mm_and_ps(below, splat(1.0f));
     alignas(16) std::int32_t i[4];
     _mm_store_si128(reinterpret_cast<__m128i*>(i),
                     _mm_and_si128(whole, _mm_set1_epi32(kVoxels - 1)));
 
     const int fx = _mm_cvttss_si32(_mm_mul_ss(fraction, _mm_set_ss(kWeights)));
     const __m128i wx = _mm_set1_epi32(fx << 16 | (kWeights - fx));
-    const __m128 fy = _mm_shuffle_ps(fraction, fraction, _MM_SHUFFLE(1, 1, 1, 1));
-    const __m128 fz = _mm_shuffle_ps(fraction, fraction, _MM_SHUFFLE(2, 2, 2, 2));
-    const int y1 = (i[1] + 1) & (kVoxels - 1), z1 = (i[2] + 1) & (kVoxels - 1);
-    const __m128 a = mix(row(i[0], i[1], i[2], wx), row(i[0], y1, i[2], wx), fy);
-    const __m128 b = mix(row(i[0], i[1], z1, wx), row(i[0], y1, z1, wx), fy);
-    Channels out;
-    _mm_storeu_ps(out.data(), _mm_mul_ps(mix(a, b, fz), _mm_loadu_ps(step_.data())));
-    return out;
+    const Lanes fy = _mm_shuffle_ps(fraction, fraction, _MM_SHUFFLE(1, 1, 1, 1));
+    const Lanes fz = _mm_shuffle_ps(fraction, fraction, _MM_SHUFFLE(2, 2, 2, 2));
+    constexpr int kNextY = 4 * kRow, kNextZ = kNextY * kVoxels, kMask = kVoxels - 1;
+    const std::int16_t* at = voxels_.data() + 4 * i[0] + kNextY * i[1] + kNextZ * i[2];
+    const int up = i[1] == kMask ? -kMask * kNextY : kNextY;
+    const int deep = i[2] == kMask ? -kMask * kNextZ : kNextZ;
+    const Lanes near = mix(row(at, wx), row(at + up, wx), fy);
+    const Lanes far = mix(row(at + deep, wx), row(at + deep + up, wx), fy);
+    return mix(near, far, fz) * _mm_loadu_ps(step_.data());
   }
 
  private:
   static constexpr int kRow = kVoxels + 1;  // the first voxel again at the end: no wrap in x
   static constexpr int kWeights = 32767;
 
-  static __m128 mix(__m128 a, __m128 b, __m128 t) {
-    return _mm_add_ps(a, _mm_mul_ps(t, _mm_sub_ps(b, a)));
-  }
+  static Lanes mix(Lanes a, Lanes b, Lanes t) { return a + t * (b - a); }
   // Both voxels of a row in one load; each channel's pair is weighted and added in one step.
-  __m128 row(int x, int y, int z, __m128i weights) const {
-    const std::int16_t* first = voxels_.data() + 4 * (x + kRow * (y + kVoxels * z));
+  static Lanes row(const std::int16_t* first, __m128i weights) {
     const __m128i both = _mm_loadu_si128(reinterpret_cast<const __m128i*>(first));
     const __m128i pairs = _mm_unpacklo_epi16(both, _mm_srli_si128(both, 8));
     return _mm_cvtepi32_ps(_mm_madd_epi16(pairs, weights));

@@ -69,7 +69,8 @@ TEST(NoiseTile, GivesBackWhatItHoldsAndInterpolates) {
   constexpr float kTolerance = 1.5e-3f;
   for (int i = 0; i < 500; ++i) {
     const Vec3f p(0.137f * i - 31.0f, -0.071f * i + 3.0f, 0.213f * i - 17.0f);
-    const auto c = tile.fetch(p);
+    const Lanes fetched = tile.fetch(lanes(p));
+    const float c[] = {lane<0>(fetched), lane<1>(fetched), lane<2>(fetched), lane<3>(fetched)};
     const float w = static_cast<float>(2.0 * M_PI / NoiseTile::kCells);
     EXPECT_NEAR(c[0], std::sin(w * p.x()), kTolerance);
     EXPECT_NEAR(c[1], std::cos(w * p.y()), kTolerance);
