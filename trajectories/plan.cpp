@@ -19,7 +19,7 @@ constexpr double kEndRoomShare = 0.12;
 constexpr double kEndRoomMm = 1.0;
 constexpr double kSmallestLoopMm = 3.0;
 constexpr double kLargestLoopShare = 0.5;  // of the tube's widest free extent
-constexpr int kMostLoops = 8;              // times those asked for
+constexpr int kMostLoops = 12;             // times those asked for
 constexpr double kWallDistanceMm = 30.0;   // typical, from the camera along its axis
 constexpr double kMostPasses = 2000.0;
 
@@ -57,8 +57,7 @@ class LengthFit {
     CourseSize size;
     if (options_.loops.count > 0) {
       for (size.passes = options_.passes; size.passes >= 1.0; size.passes -= 1.0)
-        if (length({size.passes, options_.loops.count, kSmallestLoopMm}) <= target_mm_)
-          return fit_loops(size);
+        if (const auto fit = fit_loops(size)) return *fit;
       // Too short a path even for one pass with small loops: it goes without them.
     }
     size = {1.0, 0, 0.0, 1.0};
@@ -81,17 +80,21 @@ class LengthFit {
   double length(const CourseSize& size) const { return arc_length(positions(size)).total(); }
 
  private:
-  Fit fit_loops(CourseSize size) const {
+  /// Empty when even small loops, or none, make the passes too long.
+  std::optional<Fit> fit_loops(CourseSize size) const {
+    if (length({size.passes, options_.loops.count, kSmallestLoopMm}) > target_mm_) return {};
     double widest = kSmallestLoopMm;
     for (int i = 0; i <= 16; ++i)
       widest = std::max(widest, kLargestLoopShare * tube_.extent_mm(tube_.length_mm() * i / 16, 0));
-    for (size.loops = options_.loops.count; size.loops <= kMostLoops * options_.loops.count;
-         size.loops += more_loops(size.loops)) {
-      size.loop_mm = widest;
+    size.loop_mm = widest;
+    for (int loops = options_.loops.count; loops <= kMostLoops * options_.loops.count;
+         loops += more_loops(loops)) {
+      size.loops = loops;
       if (length(size) < target_mm_) continue;
-      return solve(size, size.loop_mm, 0.0, widest);
+      if (const Fit fit = solve(size, size.loop_mm, 0.0, widest); fit.found) return fit;
+      return {};
     }
-    return {size, false};
+    return Fit{size, false};
   }
 
   /// An eighth more, whole stations.

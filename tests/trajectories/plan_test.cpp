@@ -171,7 +171,7 @@ TEST(Plan, TheFullMatrixHas17010Frames) {
 
 // Where there is little room, the clearance decides the path: it is kept, and nearly used up.
 TEST(Plan, ClearanceIsKeptWhereItIsTight) {
-  for (const auto& [radius_mm, clearance_mm] : {std::pair(32.0, 24.0), std::pair(16.0, 9.0)}) {
+  for (const auto& [radius_mm, clearance_mm] : {std::pair(32.0, 24.0), std::pair(12.0, 10.0)}) {
     const TriangleMesh wall = bent_tube(radius_mm, 75.0, rad_from_deg(110.0));
     const ClosestPoint closest(wall);
     TrajectoryOptions options = load_trajectory("4");
