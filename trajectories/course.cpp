@@ -55,7 +55,7 @@ std::vector<double> random_values(std::uint64_t seed, std::uint32_t channel, int
 }  // namespace
 
 Course::Course(const Tube& tube, const TrajectoryOptions& options, std::uint64_t seed)
-    : tube_(tube), options_(options), seed_(seed) {
+    : tube_(tube), options_(options) {
   const auto u = random_uniform(seed, Purpose::trajectory, kChannelStart, 0);
   start_rad_ = 2.0 * kPi * u[0];
   hand_ = u[1] < 0.5 ? -1.0 : 1.0;

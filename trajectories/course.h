@@ -40,7 +40,6 @@ class Course {
 
   const Tube& tube_;
   TrajectoryOptions options_;
-  std::uint64_t seed_;
   double start_rad_ = 0.0, hand_ = 1.0;
   bool from_far_end_ = false;
   Vec3 phases_;
