@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "core/units.h"
 #include "scenes/portable_math.h"
 
 namespace rugae {
@@ -90,7 +91,7 @@ OrganAxis::OrganAxis(const std::vector<AxisNode>& nodes, double step_mm, double 
   }
   double r_mean = 0.0;
   for (const Ball& b : balls_) r_mean += b.radius_mm / count;
-  log_overlap_ = std::max(0.0, portable_log(std::sqrt(2.0 * 3.14159 * r_mean * softness_mm_) / h));
+  log_overlap_ = std::max(0.0, portable_log(std::sqrt(2.0 * kPi * r_mean * softness_mm_) / h));
 }
 
 double OrganAxis::weigh(const Vec3& p, Weights& w) const {

@@ -30,8 +30,8 @@ class OrganAxis {
  public:
   /// A Catmull-Rom spline through the nodes is sampled by balls every `step_mm` or less, joined
   /// with `softness_mm` (the width over which neighbours blend). Distances in y count 1/`depth`
-  /// times (depth 0.9: sections flattened to 90 % from front to back). `outward` is the direction
-  /// the greater curvature is found by: at every ball, across the axis and across `pole`.
+  /// times (depth 0.9: sections flattened to 90 % from front to back). The greater curvature is
+  /// found at every ball across the axis and across `pole`: tangent x pole.
   OrganAxis(const std::vector<AxisNode>& nodes, double step_mm, double softness_mm, double depth,
             const Vec3& pole);
 

@@ -110,24 +110,24 @@ Scene load_scene(const SceneRequest& request) {
     file = read_scene_file(find_preset("scenes", "scene", request.name_or_path));
   }
   file.mucosa.oil = std::max(file.mucosa.oil, request.oil);
+  ImportedWall wall;
+  std::vector<Region> regions;
+  if (file.kind == Kind::mesh) {
+    wall = import_wall(file.mesh, file.import, request.seed, level);
+    regions.assign(wall.mesh.vertices.size(), Region::unknown);
+  } else {
+    StomachWall stomach =
+        make_stomach(file.stomach, request.seed, kCellMm[level] * file.stomach.scale);
+    wall.mesh = std::move(stomach.mesh);
+    regions = std::move(stomach.regions);
+  }
   Scene scene{.name = std::filesystem::path(request.name_or_path).stem().string(),
-              .wall = {},
+              .wall = std::move(wall.mesh),
               .rest_positions = {},
-              .regions = {},
+              .regions = std::move(regions),
               .mucosa = Mucosa(file.mucosa, request.seed),
               .seed = request.seed,
-              .notes = {}};
-  if (file.kind == Kind::mesh) {
-    ImportedWall wall = import_wall(file.mesh, file.import, request.seed, level);
-    scene.wall = std::move(wall.mesh);
-    scene.notes = std::move(wall.notes);
-    scene.regions.assign(scene.wall.vertices.size(), Region::unknown);
-  } else {
-    StomachWall wall =
-        make_stomach(file.stomach, request.seed, kCellMm[level] * file.stomach.scale);
-    scene.wall = std::move(wall.mesh);
-    scene.regions = std::move(wall.regions);
-  }
+              .notes = std::move(wall.notes)};
   scene.rest_positions = scene.wall.vertices;
   return scene;
 }
