@@ -84,11 +84,28 @@ json make_dataset(const StudyOptions& study, const Cell& cell, const fs::path& d
   return measured;
 }
 
-void make_estimate(const ReconOptions& options, const fs::path& dataset, const fs::path& estimate,
-                   Progress& progress) {
-  if (fs::exists(EstimateLayout{estimate}.info())) return;
+// The reason when the method gave up on these frames: a result of the study like any other.
+std::optional<std::string> make_estimate(const ReconOptions& options, const fs::path& dataset,
+                                         const fs::path& estimate, Progress& progress) {
+  if (fs::exists(EstimateLayout{estimate}.info())) return std::nullopt;
   fs::remove_all(estimate);  // what a killed run left: reconstruction has no middle to go on from
-  reconstruct(Observations::open(dataset), options, estimate, progress);
+  const Observations observations = Observations::open(dataset);
+  try {
+    reconstruct(observations, options, estimate, progress);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    progress.end("gave up");
+    return error.what();
+  }
+  return std::nullopt;
+}
+
+json metrics_of_failure(const std::string& reason, const json& simulation) {
+  const int frames = simulation.at("frames");
+  return {
+      {"failed", reason},
+      {"tracking", {{"frames", frames}, {"tracked", 0}, {"lost", frames}, {"tracked_share", 0.0}}}};
 }
 
 }  // namespace
@@ -124,15 +141,15 @@ CellResult run_cell(const StudyOptions& study, const Cell& cell, const fs::path&
                    fmt::format("{}_{}_{}", stem(cell.camera), stem(cell.trajectory), data_hash);
   result.estimate = out / "estimates" / fmt::format("{}_{}", cell.name(), hash);
   const fs::path metrics = out / "metrics" / fmt::format("{}_{}.json", cell.name(), hash);
-  result.kept = fs::exists(metrics) && fs::exists(EstimateLayout{result.estimate}.info()) &&
-                fs::exists(DatasetLayout{result.dataset}.manifest());
+  result.kept = fs::exists(metrics) && fs::exists(DatasetLayout{result.dataset}.manifest());
   if (result.kept) {
     result.metrics = read_json(metrics);
     return result;
   }
   const json simulation = make_dataset(study, cell, result.dataset, progress);
-  make_estimate(recon, result.dataset, result.estimate, progress);
-  result.metrics = evaluate(result.dataset, result.estimate, progress);
+  const auto gave_up = make_estimate(recon, result.dataset, result.estimate, progress);
+  result.metrics = gave_up ? metrics_of_failure(*gave_up, simulation)
+                           : evaluate(result.dataset, result.estimate, progress);
   result.metrics["simulation"] = simulation;
   write_atomic(metrics, result.metrics.dump(1) + "\n");
   return result;

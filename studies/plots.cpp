@@ -96,14 +96,16 @@ std::string path_svg(const PathPlot& plot, const TriangleMesh& wall, const Side&
   for (const Vec3& v : wall.vertices) box.extend(flat(v));
   for (const Vec3& p : plot.truth_mm) box.extend(flat(p));
   // A wild estimate may not squeeze the picture: it is drawn as far as the picture goes.
-  const double units_per_mm = (kSize - 2 * kBorder) / box.sizes().maxCoeff();
+  // One scale for all sides.
+  const double units_per_mm = (kSize - 2 * kBorder) / bounding_box(wall).sizes().maxCoeff();
   const double width = 2 * kBorder + units_per_mm * box.sizes().x();
   const double height = 2 * kBorder + kFoot + units_per_mm * box.sizes().y();
   const Axis x{box.min().x(), box.max().x(), kBorder, width - kBorder};
   const Axis y{box.min().y(), box.max().y(), height - kBorder - kFoot, kBorder};
   const auto at = [&](const Vec3& p) { return Vec2(x(flat(p).x()), y(flat(p).y())); };
 
-  std::string out = svg_begin(width, height, "true and estimated path, seen " + side.name);
+  std::string out = fmt::format("<div style=\"width:{:.0f}px;max-width:100%\">", width) +
+                    svg_begin(width, height, "true and estimated path, seen " + side.name);
   out += "<path class=\"organ\" d=\"" + outline(wall, side, x, y) + "\"/>\n";
   for (std::size_t i = 0; i < plot.truth_mm.size(); ++i) {
     if (!plot.estimate_mm[i].allFinite()) continue;
@@ -127,7 +129,7 @@ std::string path_svg(const PathPlot& plot, const TriangleMesh& wall, const Side&
   constexpr double kBar_mm = 50.0;
   out += fmt::format(
       "<path class=\"axis\" d=\"M{0:.1f} {1:.1f}h{2:.1f}\" stroke-width=\"2\"/>"
-      "<text x=\"{3:.1f}\" y=\"{4:.1f}\">{5:g} mm</text></svg>\n",
+      "<text x=\"{3:.1f}\" y=\"{4:.1f}\">{5:g} mm</text></svg></div>\n",
       kBorder, height - 12, units_per_mm * kBar_mm, kBorder + units_per_mm * kBar_mm + 6,
       height - 8, kBar_mm);
   return out;

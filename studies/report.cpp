@@ -40,7 +40,6 @@ std::string filled(std::string page, const std::map<std::string, std::string>& v
 }
 
 std::string lede(const ReportInput& input, const CellView& first) {
-  const json& m = first.cell.metrics;
   const Lens& lens = first.truth.camera().lens;
   const std::string scene = html::escape(stem(input.study.simulate.scene));
   if (input.cells.size() == 1)
@@ -52,7 +51,7 @@ std::string lede(const ReportInput& input, const CellView& first) {
         first.truth.size(), lens.width, lens.height,
         html::escape(paper_camera(stem(first.cell.cell.camera))),
         html::escape(stem(first.cell.cell.trajectory)),
-        html::number(m.at("trajectory").at("path_length_mm").get<double>() / 10.0, 4), scene,
+        html::number(length_mm(first.truth.track()) / 10.0, 4), scene,
         html::escape(input.study.simulate.resolution), input.study.simulate.seed,
         html::escape(first.cell.cell.method));
   return fmt::format(
@@ -111,6 +110,11 @@ std::string chapter(const std::string& title, const std::string& intro, const st
 }
 
 std::string cell_chapters(const CellView& view) {
+  if (view.cell.metrics.contains("failed"))
+    return chapter("Inside the stomach",
+                   "The reconstruction gave up: " +
+                       html::escape(view.cell.metrics.at("failed").get<std::string>()),
+                   frames_part(view));
   return chapter("Inside the stomach",
                  "Frames along the path, and what the simulator knows about every pixel of them. "
                  "The reconstruction gets the first row alone. Click a picture to enlarge it.",
@@ -130,7 +134,8 @@ std::string cells_part(const ReportInput& input, std::string& head_cards, std::s
   const bool many = input.cells.size() > 1;
   for (const CellResult& cell : input.cells) {
     const Truth truth = Truth::open(cell.dataset);
-    const Estimate estimate = read_estimate(cell.estimate);
+    const bool failed = cell.metrics.contains("failed");
+    const Estimate estimate = failed ? Estimate{} : read_estimate(cell.estimate);
     const CellView view{cell, truth, estimate, many};
     if (out.empty()) {
       cover = cover_picture(view);

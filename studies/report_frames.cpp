@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <opencv2/imgproc.hpp>
 
 #include "core/check.h"
@@ -14,8 +13,6 @@
 
 namespace rugae {
 namespace {
-
-namespace fs = std::filesystem;
 
 // `count` frames in equal steps; the last frame of the sequence has no flow and is left out.
 std::vector<int> spread(int frames, int count) {
@@ -31,14 +28,14 @@ struct Range {
   double low, high;
 };
 
+// Over all the frames together, so that one far corner does not take all colours.
 Range depth_range(const CellView& view, const std::vector<int>& frames) {
-  Range range{1e9, 0.0};
-  for (const int i : frames) {
-    const cv::Mat depth = view.truth.depth_mm(i);
-    const double low = quantile(depth, 0.02), high = quantile(depth, 0.98);
-    if (std::isfinite(low)) range = {std::min(range.low, low), std::max(range.high, high)};
-  }
-  return {std::floor(range.low), std::max(std::ceil(range.high), std::floor(range.low) + 1.0)};
+  cv::Mat all;
+  for (const int i : frames) all.push_back(view.truth.depth_mm(i));
+  constexpr double kLow = 0.01, kHigh = 0.97;
+  const double low = quantile(all, kLow), high = quantile(all, kHigh);
+  if (!std::isfinite(low)) return {0.0, 1.0};
+  return {std::floor(low), std::max(std::ceil(high), std::floor(low) + 1.0)};
 }
 
 double longest_flow_px(const CellView& view, const std::vector<int>& frames) {
@@ -67,14 +64,6 @@ std::string cell_picture(const std::string& uri, const std::string& what, const 
       fmt::format("{}, frame {} at {:.2f} s", what, frame, view.truth.track()[frame].time_s);
   return fmt::format("<img class=\"zoom\" loading=\"lazy\" src=\"{}\" alt=\"{}\">", uri,
                      html::escape(alt));
-}
-
-// "2_undistorted" -> "undistorted": stages are named so that their order is that of the names.
-std::string readable(std::string name) {
-  const auto first = name.find_first_not_of("0123456789_-");
-  if (first != std::string::npos && first > 0) name = name.substr(first);
-  std::ranges::replace(name, '_', ' ');
-  return name;
 }
 
 }  // namespace
@@ -111,7 +100,7 @@ std::string frames_part(const CellView& view) {
   out += row("Depth",
              fmt::format("<p>along the optical axis</p><div class=\"bar\" "
                          "style=\"background:{}\"></div><div class=\"ends\"><span>{:g}</span>"
-                         "<span>{:g} mm</span></div>",
+                         "<span>{:g} mm +</span></div>",
                          depth_gradient_css(), depth.low, depth.high),
              depths);
   out += row("Normals", "<p>red: right, green: up, blue: towards the camera</p>", normals);
@@ -122,28 +111,6 @@ std::string frames_part(const CellView& view) {
              flows);
   out += row("Masks", "<p>" + mask_key_html() + "</p>", masks);
   return out + "</div>\n";
-}
-
-std::string stages_part(const CellView& view) {
-  const fs::path root = EstimateLayout{view.cell.estimate}.pictures();
-  if (!fs::is_directory(root)) return {};
-  std::map<std::string, std::vector<fs::path>> stages;
-  for (const auto& entry : fs::recursive_directory_iterator(root))
-    if (entry.path().extension() == ".png")
-      stages[entry.path().parent_path().filename().string()].push_back(entry.path());
-  std::string out;
-  const std::size_t most = view.many_cells ? 3 : 8;
-  for (auto& [stage, files] : stages) {
-    std::ranges::sort(files);
-    out += "<h4>" + html::escape(readable(stage)) + "</h4><div class=\"figures\">\n";
-    for (std::size_t k = 0; k < std::min(most, files.size()); ++k) {
-      const std::string name = readable(files[k].stem().string());
-      out += html::figure(html::jpeg(read_image_bgr(files[k]), view.many_cells ? 400 : 640), name,
-                          html::escape(name));
-    }
-    out += "</div>\n";
-  }
-  return out;
 }
 
 }  // namespace rugae

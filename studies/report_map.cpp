@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "core/check.h"
 #include "render/shaded_view.h"
@@ -51,11 +52,28 @@ TriangleMesh coloured_by_error(const TriangleMesh& map, const std::vector<double
   return coloured;
 }
 
+// Triangles turned so that they face out of the organ, as the wall's do: seen by most of them,
+// since a method may wind its map either way.
+TriangleMesh facing_as(TriangleMesh map, const TriangleMesh& wall) {
+  const ClosestPoint closest(wall);
+  constexpr std::size_t kLookedAt = 2000;
+  const std::size_t step = map.triangles.size() / kLookedAt + 1;
+  double agreement = 0.0;
+  for (std::size_t t = 0; t < map.triangles.size(); t += step) {
+    const int beside = closest(map.vertices[map.triangles[t][0]]).triangle;
+    agreement += triangle_normal(map, t).dot(triangle_normal(wall, beside));
+  }
+  if (agreement >= 0.0) return map;
+  for (Vec3i& triangle : map.triangles) std::swap(triangle[1], triangle[2]);
+  map.normals.clear();
+  return map;
+}
+
 std::string picture(const TriangleMesh& mesh, const Eigen::AlignedBox3d& box, const Side& side,
-                    bool look_inside, const std::string& alt, const std::string& caption) {
+                    const std::string& alt, const std::string& caption) {
   const Lens lens = picture_lens(kWidth_px, kHeight_px);
   ShadedViewOptions options;
-  options.cull_front = look_inside;
+  options.cull_front = true;  // the near side is left out: the eye looks into the organ
   const cv::Mat image =
       shaded_view(mesh, view_of_box(box, side.from, side.up, lens), lens, options);
   return html::figure(html::jpeg(image, kWidth_px, 88), alt + ", " + side.name, caption);
@@ -77,7 +95,7 @@ std::string map_part(const CellView& view) {
   double worst_mm = 1.0;
   const bool has_map = to_truth && !view.estimate.map.empty() && !visibility.seen_wall().empty();
   if (has_map) {
-    map = transformed(view.estimate.map, *to_truth);
+    map = facing_as(transformed(view.estimate.map, *to_truth), truth.wall());
     if (map.normals.empty()) map.normals = angle_weighted_normals(map);
     const std::vector<double> error_mm = distances_mm(map.vertices, visibility.seen_wall());
     std::vector<double> sorted = error_mm;
@@ -90,14 +108,14 @@ std::string map_part(const CellView& view) {
   }
   out += fmt::format("<div class=\"maps\" style=\"--columns:{}\">", has_map ? 3 : 1);
   for (const Side& side : two_sides()) {
-    out += picture(wall, box, side, true, "true wall",
+    out += picture(wall, box, side, "true wall",
                    fmt::format("The true wall, {}, looking in through the near side. Rose: seen by "
                                "the capsule; gray: never seen.",
                                side.name));
     if (!has_map) continue;
-    out += picture(map, box, side, false, "reconstructed map",
-                   fmt::format("The reconstructed map in its own colours, same view and scale."));
-    out += picture(errors, box, side, false, "map coloured by error",
+    out += picture(map, box, side, "reconstructed map",
+                   "The reconstructed map in its own colours, same view and scale.");
+    out += picture(errors, box, side, "map coloured by error",
                    "The map coloured by its distance to the wall that was seen.");
   }
   out += "</div>\n";

@@ -161,17 +161,17 @@ std::string headline_cards(const CellView& view) {
   const double speed = value_at(metrics, "time.frames_per_s");
   const double seen = value_at(metrics, "coverage.seen_share");
   std::string out = "<div class=\"cards\">\n";
+  out += card("Path error, RMSE", html::number(ate), "mm",
+              against_paper(ate, paper.ate_rmse_mm, "mm"));
   out +=
-      card("Path error", html::number(ate), "mm RMSE", against_paper(ate, paper.ate_rmse_mm, "mm"));
-  out +=
-      card("Map error", html::number(map), "mm mean", against_paper(map, paper.map_mean_mm, "mm"));
+      card("Map error, mean", html::number(map), "mm", against_paper(map, paper.map_mean_mm, "mm"));
   out += card("Frames tracked", fmt::format("{}", metrics.at("tracking").at("tracked").get<int>()),
               fmt::format("of {}", metrics.at("tracking").at("frames").get<int>()),
-              fmt::format("{} key frames", metrics.at("tracking").at("keyframes").get<int>()));
-  out += card("Reconstructed", html::number(speed), "frames a second",
-              against_paper(speed, 1.0 / paper.seconds_per_frame_pair, "pairs a second", true));
-  out += card("Simulated", html::number(value_at(metrics, "simulation.frames_per_s")),
-              "frames a second", "with all labels");
+              html::number(value_at(metrics, "tracking.keyframes"), 1) + " key frames");
+  out += card("Reconstructed", html::number(speed), "frames/s",
+              against_paper(speed, 1.0 / paper.seconds_per_frame_pair, "pairs/s", true));
+  out += card("Simulated", html::number(value_at(metrics, "simulation.frames_per_s")), "frames/s",
+              "with all labels");
   out += card("Wall seen", html::number(kPercent * seen), "%",
               fmt::format("{} of {} cm&sup2;",
                           html::number(value_at(metrics, "coverage.seen_area_mm2") / 100.0),

@@ -1,0 +1,86 @@
+#include "validate/evaluate.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "core/files.h"
+#include "tests/studies/inside_sphere.h"
+#include "tests/studies/temporary_folder.h"
+
+namespace rugae {
+namespace {
+
+using nlohmann::json;
+
+// Meshes are written as 32-bit floats by some writers: 1e-6 of their size.
+constexpr double kStored_mm = 1e-3;
+// The sphere's facets lie inside it: 40 mm (1 - cos(pi / (60 sqrt 2))).
+constexpr double kFacets_mm = 0.03;
+
+class Evaluate : public TemporaryFolder {
+ protected:
+  json metrics(double units_per_mm, double radius_mm = inside_sphere::kRadius_mm) {
+    inside_sphere::write_dataset(folder_ / "data");
+    inside_sphere::write_estimate_of_truth(folder_ / "estimate", units_per_mm, radius_mm);
+    Progress progress(Progress::Output::silent);
+    return evaluate(folder_ / "data", folder_ / "estimate", progress);
+  }
+};
+
+TEST_F(Evaluate, TheTruthInAnotherWorldHasNoErrorButItsLostFrame) {
+  const json m = metrics(0.05);
+  const json& path = m.at("trajectory");
+  EXPECT_TRUE(path.at("ate_sim3_rmse_mm").get<double>() <= 1e-9);
+  EXPECT_NEAR(path.at("scale_mm_per_unit").get<double>(), 20.0, 1e-9);
+  EXPECT_TRUE(path.at("ate_se3_rmse_mm").get<double>() > 1.0);
+  EXPECT_EQ(path.at("note"), "");
+  EXPECT_EQ(m.at("tracking").at("tracked"), 11);
+  EXPECT_EQ(m.at("tracking").at("lost"), 1);
+  EXPECT_EQ(m.at("tracking").at("keyframes"), 4);
+  EXPECT_TRUE(m.at("depth").at("sim3").at("abs_rel").get<double>() <= 1e-6);
+  EXPECT_EQ(m.at("depth").at("sim3").at("frames"), 4);
+  EXPECT_EQ(m.at("depth").at("sim3").at("valid_share"), 1.0);
+  const json& surface = m.at("surface").at("trajectory_aligned");
+  EXPECT_TRUE(surface.at("completeness_max_mm").get<double>() <= kStored_mm);
+  EXPECT_EQ(surface.at("recall_at_0.25mm"), 1.0);
+  EXPECT_EQ(m.at("time").at("reconstruct_s"), 2.0);
+  EXPECT_EQ(m.at("time").at("frames_per_s"), 6.0);
+  EXPECT_EQ(m.at("time").at("peak_rss_mb"), 200.0);
+}
+
+TEST_F(Evaluate, AMapOneMillimetreTooLargeIsOneMillimetreOff) {
+  const json m = metrics(1.0, inside_sphere::kRadius_mm + 1.0);
+  const json& surface = m.at("surface").at("trajectory_aligned");
+  EXPECT_NEAR(surface.at("completeness_mean_mm").get<double>(), 1.0, kFacets_mm);
+  EXPECT_EQ(surface.at("f_at_0.5mm"), 0.0);
+  EXPECT_EQ(surface.at("recall_at_2mm"), 1.0);
+}
+
+TEST_F(Evaluate, FramesForPlotsHaveGapsWhereFramesWereLost) {
+  const json frames = metrics(0.05).at("frames");
+  ASSERT_EQ(frames.at("time_s").size(), static_cast<std::size_t>(inside_sphere::kFrames));
+  EXPECT_TRUE(frames.at("position_error_mm")[5].is_null());
+  EXPECT_TRUE(frames.at("estimate_mm")[5].is_null());
+  EXPECT_EQ(frames.at("state")[5], "lost");
+  for (int i = 0; i < inside_sphere::kFrames; ++i)
+    if (i != 5)
+      for (int k = 0; k < 3; ++k)
+        EXPECT_NEAR(frames.at("estimate_mm")[i][k].get<double>(),
+                    frames.at("truth_mm")[i][k].get<double>(), 1e-9);
+}
+
+TEST_F(Evaluate, AnEstimateOfOtherFramesIsAnError) {
+  inside_sphere::write_dataset(folder_ / "data");
+  inside_sphere::write_estimate_of_truth(folder_ / "estimate", 1.0);
+  const EstimateLayout layout{folder_ / "estimate"};
+  Estimate estimate = read_estimate(layout.root);
+  for (double& t : estimate.times_s) t += 1.0;
+  write_estimate(layout.root, estimate);
+  Progress progress(Progress::Output::silent);
+  EXPECT_THROW(evaluate(folder_ / "data", layout.root, progress), Error);
+}
+
+}  // namespace
+}  // namespace rugae
