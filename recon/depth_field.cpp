@@ -12,19 +12,19 @@ namespace {
 
 constexpr std::size_t kMinSamples = 12;
 constexpr int kFold = 5;  // every fifth sample is left out to choose the penalty
-constexpr int kReweightings = 5;
+constexpr int kReweightings = 4;
 constexpr double kMadToSigma = 1.4826;  // of a normal distribution
 constexpr double kKeptSigmas = 3.0;
 /// Cauchy's weight 1 / (1 + (r / (c sigma))^2): 95 % efficient for normal errors.
 constexpr double kCauchy = 2.385;
 /// Strength of the thin-plate penalty against the mean weight of samples on a control point.
-constexpr std::array<double, 5> kPenalties = {1e-3, 1e-2, 1e-1, 1.0, 10.0};
+constexpr std::array<double, 4> kPenalties = {1e-2, 1e-1, 1.0, 10.0};
 constexpr double kFirstPenalty = 1e-1;
 /// Keeps control points that no sample reaches from making the system singular.
 constexpr double kRidge = 1e-9;
-/// The scale is held to zero with the strength of this share of the samples' own say: without any
-/// contrast in the ingredient it is not determined.
-constexpr double kScaleRidge = 1e-6;
+/// The scale is expected near 0 with this standard deviation: without contrast in the ingredient
+/// the samples do not determine it.
+constexpr double kScalePrior = 1.0;
 
 /// The four uniform cubic B-spline weights at fraction t of a cell.
 std::array<double, 4> cubic_weights(double t) {
@@ -49,72 +49,109 @@ Cell cell_at(const DepthField& field, const Vec2& pixel) {
   return cell;
 }
 
-using Triplets = std::vector<Eigen::Triplet<double>>;
+/// The normal equations of the spline: each control point meets those within three rows and columns
+/// of it. Half of the symmetric matrix is kept: 4 entries of its own row, 7 of each row below.
+class NormalEquations {
+ public:
+  NormalEquations(int columns, int rows) : columns_(columns), rows_(rows) {}
 
-/// Squared second differences of the control points, the mixed one twice: thin plate.
-void add_penalty(const DepthField& field, double strength, Triplets& lower) {
-  const auto index = [&](int row, int column) { return row * field.columns + column; };
-  const auto add = [&](std::initializer_list<std::pair<int, double>> stencil, double weight) {
-    for (const auto& [i, a] : stencil)
-      for (const auto& [j, b] : stencil)
-        if (i >= j) lower.emplace_back(i, j, strength * weight * a * b);
-  };
-  for (int r = 0; r < field.rows; ++r)
-    for (int c = 0; c < field.columns; ++c) {
-      if (c + 2 < field.columns)
-        add({{index(r, c), 1.0}, {index(r, c + 1), -2.0}, {index(r, c + 2), 1.0}}, 1.0);
-      if (r + 2 < field.rows)
-        add({{index(r, c), 1.0}, {index(r + 1, c), -2.0}, {index(r + 2, c), 1.0}}, 1.0);
-      if (c + 1 < field.columns && r + 1 < field.rows)
-        add({{index(r, c), 1.0},
-             {index(r, c + 1), -1.0},
-             {index(r + 1, c), -1.0},
-             {index(r + 1, c + 1), 1.0}},
-            2.0);
+  /// Minimises sum w (value - spline - scale * ingredient)^2 + penalty; false when not determined.
+  bool solve(const std::vector<FieldSample>& samples, const std::vector<double>& weights,
+             double penalty, double min_sigma, DepthField& field) {
+    stencil_.assign(static_cast<std::size_t>(columns_) * rows_, {});
+    const int controls = columns_ * rows_;
+    Eigen::MatrixXd right = Eigen::MatrixXd::Zero(controls, 2);  // of values, of the ingredient
+    double total = 0.0, ingredient_square = 0.0, ingredient_value = 0.0;
+    for (std::size_t s = 0; s < samples.size(); ++s) {
+      if (!(weights[s] > 0.0)) continue;
+      add_sample(cell_at(field, samples[s].pixel), samples[s], weights[s], right);
+      total += weights[s];
+      ingredient_square += weights[s] * samples[s].ingredient * samples[s].ingredient;
+      ingredient_value += weights[s] * samples[s].ingredient * samples[s].value;
     }
-}
+    if (!(total > 0.0)) return false;
+    const double mean_weight = total / controls;
+    add_penalty(penalty * mean_weight);
+    for (auto& entries : stencil_) entries[0] += kRidge * mean_weight;
 
-/// Minimises sum w (value - spline - scale * ingredient)^2 + penalty; false when not determined.
-bool solve(const std::vector<FieldSample>& samples, const std::vector<double>& weights,
-           double penalty, DepthField& field) {
-  const int controls = field.columns * field.rows, unknowns = controls + 1;
-  Triplets lower;
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
-  double total = 0.0, ingredient_square = 0.0;
-  for (std::size_t s = 0; s < samples.size(); ++s) {
-    const double w = weights[s];
-    if (!(w > 0.0)) continue;
-    const Cell cell = cell_at(field, samples[s].pixel);
-    std::array<std::pair<int, double>, 17> row;
-    for (int j = 0; j < 4; ++j)
-      for (int i = 0; i < 4; ++i)
-        row[4 * j + i] = {(cell.row + j) * field.columns + cell.column + i,
-                          cell.down[j] * cell.across[i]};
-    row[16] = {controls, samples[s].ingredient};
-    for (std::size_t a = 0; a < row.size(); ++a) {
-      right[row[a].first] += w * row[a].second * samples[s].value;
-      for (std::size_t b = 0; b <= a; ++b)
-        lower.emplace_back(row[a].first, row[b].first, w * row[a].second * row[b].second);
-    }
-    total += w;
-    ingredient_square += w * samples[s].ingredient * samples[s].ingredient;
+    const Eigen::SparseMatrix<double> normal = matrix();
+    if (!analysed_) factor_.analyzePattern(normal);
+    analysed_ = true;
+    factor_.factorize(normal);
+    if (factor_.info() != Eigen::Success) return false;
+    // The scale is eliminated: A c + b s = v, b'c + d s = e.
+    const Eigen::MatrixXd solution = factor_.solve(right);
+    const double sigma = std::max(field.sigma, min_sigma);  // of the round before
+    const double left = ingredient_square + sigma * sigma / (kScalePrior * kScalePrior) -
+                        right.col(1).dot(solution.col(1));
+    field.scale = (ingredient_value - right.col(1).dot(solution.col(0))) / left;
+    field.control = solution.col(0) - field.scale * solution.col(1);
+    return field.control.allFinite() && std::isfinite(field.scale);
   }
-  if (!(total > 0.0)) return false;
-  const double mean_weight = total / controls;
-  add_penalty(field, penalty * mean_weight, lower);
-  for (int i = 0; i < controls; ++i) lower.emplace_back(i, i, kRidge * mean_weight);
-  lower.emplace_back(controls, controls,
-                     kScaleRidge * ingredient_square + std::numeric_limits<double>::min());
-  Eigen::SparseMatrix<double> normal(unknowns, unknowns);
-  normal.setFromTriplets(lower.begin(), lower.end());
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor(normal);
-  if (factor.info() != Eigen::Success) return false;
-  const Eigen::VectorXd solution = factor.solve(right);
-  if (factor.info() != Eigen::Success || !solution.allFinite()) return false;
-  field.control = solution.head(controls);
-  field.scale = solution[controls];
-  return true;
-}
+
+ private:
+  static constexpr int kEntries = 25;
+  /// Place of the entry (down, across) in the half stencil; down > 0, or down = 0 and across >= 0.
+  static int entry(int down, int across) { return down == 0 ? across : 7 * down + across; }
+
+  void add_sample(const Cell& cell, const FieldSample& sample, double weight,
+                  Eigen::MatrixXd& right) {
+    for (int j = 0; j < 4; ++j)
+      for (int i = 0; i < 4; ++i) {
+        const int index = (cell.row + j) * columns_ + cell.column + i;
+        const double own = weight * cell.down[j] * cell.across[i];
+        right(index, 0) += own * sample.value;
+        right(index, 1) += own * sample.ingredient;
+        std::array<double, kEntries>& entries = stencil_[index];
+        for (int below = j; below < 4; ++below)
+          for (int other = below == j ? i : 0; other < 4; ++other)
+            entries[entry(below - j, other - i)] += own * cell.down[below] * cell.across[other];
+      }
+  }
+
+  /// Squared second differences of the control points, the mixed one twice: thin plate.
+  void add_penalty(double strength) {
+    struct Tap {
+      int row, column;
+      double factor;
+    };
+    const auto add = [&](int r, int c, std::initializer_list<Tap> taps, double weight) {
+      for (const Tap& a : taps)
+        for (const Tap& b : taps)
+          if (b.row > a.row || (b.row == a.row && b.column >= a.column))
+            stencil_[(r + a.row) * columns_ + c + a.column][entry(
+                b.row - a.row, b.column - a.column)] += strength * weight * a.factor * b.factor;
+    };
+    for (int r = 0; r < rows_; ++r)
+      for (int c = 0; c < columns_; ++c) {
+        if (c + 2 < columns_) add(r, c, {{0, 0, 1.0}, {0, 1, -2.0}, {0, 2, 1.0}}, 1.0);
+        if (r + 2 < rows_) add(r, c, {{0, 0, 1.0}, {1, 0, -2.0}, {2, 0, 1.0}}, 1.0);
+        if (c + 1 < columns_ && r + 1 < rows_)
+          add(r, c, {{0, 0, 1.0}, {0, 1, -1.0}, {1, 0, -1.0}, {1, 1, 1.0}}, 2.0);
+      }
+  }
+
+  /// The lower half, column by column, always with the same pattern.
+  Eigen::SparseMatrix<double> matrix() const {
+    const int controls = columns_ * rows_;
+    Eigen::SparseMatrix<double> lower(controls, controls);
+    lower.reserve(Eigen::VectorXi::Constant(controls, kEntries));
+    for (int r = 0; r < rows_; ++r)
+      for (int c = 0; c < columns_; ++c)
+        for (int down = 0; down < 4 && r + down < rows_; ++down)
+          for (int across = down == 0 ? 0 : -3; across <= 3; ++across)
+            if (c + across >= 0 && c + across < columns_)
+              lower.insert((r + down) * columns_ + c + across, r * columns_ + c) =
+                  stencil_[r * columns_ + c][entry(down, across)];
+    lower.makeCompressed();
+    return lower;
+  }
+
+  int columns_, rows_;
+  bool analysed_ = false;
+  std::vector<std::array<double, kEntries>> stencil_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor_;
+};
 
 void find_residuals(const std::vector<FieldSample>& samples, DepthField& field) {
   field.residuals.resize(samples.size());
@@ -132,9 +169,9 @@ double median_magnitude(std::vector<double> values) {
 
 /// Iteratively reweighted least squares; the last weights are left in `weights`.
 bool solve_robustly(const std::vector<FieldSample>& samples, double penalty, double min_sigma,
-                    DepthField& field, std::vector<double>& weights) {
+                    NormalEquations& equations, DepthField& field, std::vector<double>& weights) {
   for (int round = 0; round < kReweightings; ++round) {
-    if (!solve(samples, weights, penalty, field)) return false;
+    if (!equations.solve(samples, weights, penalty, min_sigma, field)) return false;
     find_residuals(samples, field);
     field.sigma = std::max(kMadToSigma * median_magnitude(field.residuals), min_sigma);
     for (std::size_t s = 0; s < samples.size(); ++s) {
@@ -177,9 +214,11 @@ std::optional<DepthField> fit_depth_field(const std::vector<FieldSample>& sample
   field.columns = static_cast<int>(std::ceil(size.width / spacing_px)) + 3;
   field.rows = static_cast<int>(std::ceil(size.height / spacing_px)) + 3;
 
+  NormalEquations equations(field.columns, field.rows);
   std::vector<double> weights;
   for (const FieldSample& sample : samples) weights.push_back(sample.weight);
-  if (!solve_robustly(samples, kFirstPenalty, min_sigma, field, weights)) return std::nullopt;
+  if (!solve_robustly(samples, kFirstPenalty, min_sigma, equations, field, weights))
+    return std::nullopt;
 
   // Every fifth sample, by their order, is left out; wrong ones were unmasked above and the mean
   // over the rest is weighted accordingly.
@@ -188,7 +227,7 @@ std::optional<DepthField> fit_depth_field(const std::vector<FieldSample>& sample
     DepthField trial = field;
     std::vector<double> training = weights;
     for (std::size_t s = 0; s < samples.size(); s += kFold) training[s] = 0.0;
-    if (!solve(samples, training, penalty, trial)) continue;
+    if (!equations.solve(samples, training, penalty, min_sigma, trial)) continue;
     find_residuals(samples, trial);
     double error = 0.0, total = 0.0;
     for (std::size_t s = 0; s < samples.size(); s += kFold) {
@@ -198,7 +237,8 @@ std::optional<DepthField> fit_depth_field(const std::vector<FieldSample>& sample
     if (total > 0.0 && error / total < best_error)
       best_error = error / total, best_penalty = penalty;
   }
-  if (!solve_robustly(samples, best_penalty, min_sigma, field, weights)) return std::nullopt;
+  if (!solve_robustly(samples, best_penalty, min_sigma, equations, field, weights))
+    return std::nullopt;
   field.held_out = best_error;
   for (const double residual : field.residuals)
     field.kept.push_back(std::abs(residual) <= kKeptSigmas * field.sigma);

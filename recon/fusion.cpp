@@ -15,6 +15,7 @@
 
 #include "core/check.h"
 #include "recon/map.h"
+#include "recon/pinhole.h"
 
 namespace rugae {
 namespace {
@@ -38,11 +39,6 @@ struct View {
   cv::Mat depth, bgr;
   double fx, fy, cx, cy;  // whole-numbered centres, offset of the mosaic included
 };
-
-bool is_pinhole(const Lens& lens) {
-  return lens.model == LensModel::brown_conrady && lens.k1 == 0.0 && lens.k2 == 0.0 &&
-         lens.k3 == 0.0 && lens.p1 == 0.0 && lens.p2 == 0.0;
-}
 
 View to_view(const Mosaic& mosaic, const MosaicDepth& placed, const Lens& lens) {
   View view{placed.depth.clone(),

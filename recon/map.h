@@ -44,4 +44,10 @@ TriangleMesh fuse_map(const std::vector<Mosaic>& mosaics,
 cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world,
                        const Lens& original_lens);
 
+/// The same with the lens' pixel_rays at hand, for many key frames of one lens.
+cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world, const Lens& lens,
+                       const std::vector<Vec3>& rays);
+/// Unit rays through all pixel centres, row by row; zero where the lens has none.
+std::vector<Vec3> pixel_rays(const Lens& lens);
+
 }  // namespace rugae

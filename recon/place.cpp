@@ -1,5 +1,7 @@
 // Tsai and Shah's relief of a mosaic, scaled and placed by the sparse points.
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +11,7 @@
 #include "core/check.h"
 #include "recon/depth_field.h"
 #include "recon/map.h"
+#include "recon/pinhole.h"
 
 namespace rugae {
 namespace {
@@ -16,7 +19,7 @@ namespace {
 constexpr std::size_t kMinPoints = 24;
 /// Control points of the smooth part: about this many sparse points share one cell's area.
 constexpr double kPointsPerCell = 4.0;
-constexpr double kMinSpacingPx = 12.0, kMaxSpacingPx = 64.0;  // at 640 px width
+constexpr double kMinSpacingPx = 16.0, kMaxSpacingPx = 64.0;  // at 640 px width
 /// Relief kept: smaller than the smooth part can follow, larger than single pixels.
 constexpr double kReliefGrainPx = 1.5;  // standard deviation of the smoothing, at 640 px width
 /// Slopes above this (62 degrees) from single pixels are noise of the linear approximation.
@@ -25,11 +28,11 @@ constexpr float kMaxReliefSlope = 2.0f;
 constexpr double kReachInSpacings = 2.5;
 constexpr double kMinReachPx = 8.0, kMaxReachPx = 48.0;  // at 640 px width
 /// Points nearer to the field than this share of their depth are never called wrong.
-constexpr double kMinSpread = 1e-4;
+constexpr double kMinSpread = 1e-3;
 /// A point the anchor itself saw is not behind a fold; others may be.
 constexpr double kUnseenByAnchorWeight = 0.3;
 /// A wall seen more obliquely than this (80 degrees) is a fold's edge bridged by the smooth part.
-constexpr double kMinIncidenceCosine = 0.17;
+constexpr float kMinIncidenceCosine = 0.17f;
 
 /// Mean over known pixels only: blur(value * known) / blur(known).
 cv::Mat masked_blur(const cv::Mat& values, const cv::Mat& valid, double sigma) {
@@ -96,31 +99,43 @@ cv::Mat out_of_reach(const std::vector<SparsePoint>& points, const std::vector<b
   return distance > reach_px;
 }
 
-/// Clears depths where the surface through the neighbours is seen at a grazing angle.
+/// Clears depths where the surface through the neighbours is seen at a grazing angle, and what is
+/// not a depth.
 void drop_grazing(const Mosaic& mosaic, const Lens& lens, cv::Mat& depth) {
+  constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
   const LensProjector projector(lens);
-  const cv::Mat before = depth.clone();
-  const auto point = [&](int y, int x) -> std::optional<Vec3> {
-    const float z = before.at<float>(y, x);
-    if (!(z > 0.0f)) return std::nullopt;
-    const auto ray = projector.unproject(mosaic.origin_px + Vec2(x + 0.5, y + 0.5));
-    if (!ray) return std::nullopt;
-    return Vec3(*ray * (z / ray->z()));
-  };
-  for (int y = 0; y < depth.rows; ++y)
+  const bool pinhole = is_pinhole(lens);
+  cv::Mat points(depth.size(), CV_32FC3, cv::Scalar::all(kUnknown));
+  tbb::parallel_for(0, depth.rows, [&](int y) {
     for (int x = 0; x < depth.cols; ++x) {
-      const auto centre = point(y, x);
-      if (!centre) {
-        depth.at<float>(y, x) = std::numeric_limits<float>::quiet_NaN();
+      float& z = depth.at<float>(y, x);
+      if (!(z > 0.0f)) {
+        z = kUnknown;
         continue;
       }
-      const auto right = x + 1 < depth.cols ? point(y, x + 1) : std::nullopt;
-      const auto below = y + 1 < depth.rows ? point(y + 1, x) : std::nullopt;
-      if (!right || !below) continue;
-      const Vec3 normal = (*right - *centre).cross(*below - *centre).normalized();
-      if (!(std::abs(normal.dot(centre->normalized())) >= kMinIncidenceCosine))
-        depth.at<float>(y, x) = std::numeric_limits<float>::quiet_NaN();
+      const Vec2 pixel = mosaic.origin_px + Vec2(x + 0.5, y + 0.5);
+      Vec3 ray((pixel.x() - lens.cx) / lens.fx, (pixel.y() - lens.cy) / lens.fy, 1.0);
+      if (!pinhole) {
+        const auto bent = projector.unproject(pixel);
+        if (bent) ray = *bent / bent->z();
+        if (!bent) z = kUnknown;
+      }
+      const Vec3f p = (z * ray).cast<float>();
+      points.at<cv::Vec3f>(y, x) = {p.x(), p.y(), p.z()};
     }
+  });
+  tbb::parallel_for(0, depth.rows - 1, [&](int y) {
+    const auto at = [&](int row, int x) {
+      const cv::Vec3f& p = points.at<cv::Vec3f>(row, x);
+      return Vec3f(p[0], p[1], p[2]);
+    };
+    for (int x = 0; x + 1 < depth.cols; ++x) {
+      const Vec3f centre = at(y, x);
+      const Vec3f normal = (at(y, x + 1) - centre).cross(at(y + 1, x) - centre).normalized();
+      const float cosine = std::abs(normal.dot(centre.normalized()));
+      if (cosine < kMinIncidenceCosine) depth.at<float>(y, x) = kUnknown;  // not at the rim (NaN)
+    }
+  });
 }
 
 }  // namespace
@@ -164,10 +179,11 @@ std::optional<MosaicDepth> place_mosaic(const Mosaic& mosaic, const Structure& s
   if (!field) return std::nullopt;
 
   placed.depth = cv::Mat(mosaic.valid.size(), CV_32F);
-  for (int y = 0; y < placed.depth.rows; ++y)
+  tbb::parallel_for(0, placed.depth.rows, [&](int y) {
     for (int x = 0; x < placed.depth.cols; ++x)
       placed.depth.at<float>(y, x) = static_cast<float>(
           std::exp(field->spline({x + 0.5, y + 0.5}) + field->scale * relief.at<float>(y, x)));
+  });
   const float unknown = std::numeric_limits<float>::quiet_NaN();
   placed.depth.setTo(unknown, mosaic.valid == 0);
   placed.depth.setTo(unknown, out_of_reach(points, field->kept, placed.depth.size(), reach_px));

@@ -1,5 +1,7 @@
 #include "recon/shading.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
@@ -129,7 +131,7 @@ cv::Mat tsai_shah(const cv::Mat& intensity, const cv::Mat& valid, const LightEst
   cv::Mat variance(intensity.size(), CV_32F, cv::Scalar(options.s_0));
   const auto inside = [&](int y, int x) { return valid.empty() || valid.at<uchar>(y, x) != 0; };
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
-    for (int y = 0; y < intensity.rows; ++y) {
+    tbb::parallel_for(0, intensity.rows, [&](int y) {
       const float* row = before.ptr<float>(y);
       const float* above = before.ptr<float>(std::max(y - 1, 0));
       float* out = after.ptr<float>(y);
@@ -149,7 +151,7 @@ cv::Mat tsai_shah(const cv::Mat& intensity, const cv::Mat& valid, const LightEst
         out[x] = static_cast<float>(z - gain * f);
         s_row[x] = static_cast<float>((1.0 - gain * df) * s_row[x]);
       }
-    }
+    });
     std::swap(before, after);
   }
   return before;

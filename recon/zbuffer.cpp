@@ -7,13 +7,16 @@
 #include <limits>
 #include <opencv2/core.hpp>
 
+#include "core/check.h"
 #include "recon/map.h"
 
 namespace rugae {
 namespace {
 
-/// A straight edge is curved by the lens: the box around the projected corners grows by one pixel
-/// and by this share of its size.
+/// A straight edge is curved by the lens, by an amount that grows with the square of its length:
+/// the box around the projected corners grows by one pixel, and by a quarter of its size once it
+/// measures this share of the picture's width.
+constexpr double kCurvedShare = 0.125;
 constexpr double kCurvedEdgeMargin = 0.25;
 
 struct Corner {
@@ -50,9 +53,25 @@ bool outside_cone(const Vec3& a, const Vec3& b, const Vec3& c, double half_angle
 
 }  // namespace
 
+std::vector<Vec3> pixel_rays(const Lens& lens) {
+  const LensProjector projector(lens);
+  std::vector<Vec3> rays(static_cast<std::size_t>(lens.width) * lens.height, Vec3::Zero());
+  for (int y = 0; y < lens.height; ++y)
+    for (int x = 0; x < lens.width; ++x)
+      if (const auto ray = projector.unproject({x + 0.5, y + 0.5}))
+        rays[static_cast<std::size_t>(y) * lens.width + x] = *ray;
+  return rays;
+}
+
 cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world,
                        const Lens& original_lens) {
-  const Lens& lens = original_lens;
+  return keyframe_depth(map, cam_from_world, original_lens, pixel_rays(original_lens));
+}
+
+cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world, const Lens& lens,
+                       const std::vector<Vec3>& rays) {
+  check(rays.size() == static_cast<std::size_t>(lens.width) * lens.height,
+        "keyframe_depth: {} rays for {} x {} pixels", rays.size(), lens.width, lens.height);
   const LensProjector projector(lens);
   cv::Mat depth(lens.height, lens.width, CV_32F,
                 cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
@@ -63,12 +82,6 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world,
     const Vec3 p_cam = cam_from_world * vertex;
     corners.push_back({p_cam, p_cam.z() > 0.0 ? projector.project(p_cam) : std::nullopt});
   }
-  std::vector<Vec3> rays(static_cast<std::size_t>(lens.width) * lens.height, Vec3::Zero());
-  for (int y = 0; y < lens.height; ++y)
-    for (int x = 0; x < lens.width; ++x)
-      if (const auto ray = projector.unproject({x + 0.5, y + 0.5}))
-        rays[static_cast<std::size_t>(y) * lens.width + x] = *ray;
-
   for (const Vec3i& triangle : map.triangles) {
     const std::array<const Corner*, 3> c = {&corners[triangle[0]], &corners[triangle[1]],
                                             &corners[triangle[2]]};
@@ -80,11 +93,13 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world,
       continue;
     // A triangle that reaches out of what the lens sees may cover anything.
     if (projected < 3) box = {Vec2(0, 0), Vec2(lens.width, lens.height)};
-    const Vec2 margin = Vec2(1, 1) + kCurvedEdgeMargin * box.sizes();
-    const int left = std::max(0, static_cast<int>(std::floor(box.min().x() - margin.x())));
-    const int top = std::max(0, static_cast<int>(std::floor(box.min().y() - margin.y())));
-    const int right = std::min(lens.width - 1.0, std::ceil(box.max().x() + margin.x()));
-    const int bottom = std::min(lens.height - 1.0, std::ceil(box.max().y() + margin.y()));
+    const double size_px = box.sizes().maxCoeff();
+    const double curved = std::min(1.0, size_px / (kCurvedShare * lens.width));
+    const double margin = 1.0 + kCurvedEdgeMargin * curved * size_px;
+    const int left = std::max(0, static_cast<int>(std::floor(box.min().x() - margin)));
+    const int top = std::max(0, static_cast<int>(std::floor(box.min().y() - margin)));
+    const int right = std::min(lens.width - 1.0, std::ceil(box.max().x() + margin));
+    const int bottom = std::min(lens.height - 1.0, std::ceil(box.max().y() + margin));
     if (left > right || top > bottom) continue;
     const Vec3 ab = c[1]->p_cam - c[0]->p_cam, ac = c[2]->p_cam - c[0]->p_cam;
     for (int y = top; y <= bottom; ++y)
