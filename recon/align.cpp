@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/random.h"
-#include "recon/keyframes.h"
+#include "recon/flow.h"
 #include "recon/patch_align.h"
 #include "recon/refine.h"
 
@@ -24,6 +24,8 @@ constexpr double kMinTexture = 1e-6;  // smaller eigenvalue of the structure ten
 constexpr double kMinInlierShare = 0.3;  // of the matches, on the first plane
 constexpr int kMaxPlanes = 6;
 constexpr int kBorderPx = 2;
+constexpr double kSmoothingPx = 1.2;      // of the refined patches: noise is finer than the texture
+constexpr double kWideCorrelation = 0.5;  // many pixels: the predicted deviation decides
 
 struct Match {
   Vec2 reference_px, moving_px;
@@ -165,13 +167,20 @@ std::optional<Mat3> take_homography(std::vector<Match>& matches, double threshol
 
 // The inliers of one homography, each refined on its own patch.
 void refine(const PatchPair& pair, const std::vector<Match>& inliers, const Mat3& ref_from_mov,
-            bool indexed, PairAlignment& result) {
+            double wide_radius_px, bool indexed, PairAlignment& result) {
   const Mat3 mov_from_ref = ref_from_mov.inverse();
+  // Smooth mucosa has too little texture for the small patch: the paper's radius fixes it there.
+  PointRefinementOptions wide;
+  wide.radius_px = wide_radius_px;
+  wide.min_correlation = kWideCorrelation;
   std::vector<std::optional<Vec2>> refined(inliers.size());
   tbb::parallel_for(std::size_t{0}, inliers.size(), [&](std::size_t i) {
     const Match& m = inliers[i];
-    refined[i] = refine_point(pair.reference, pair.moving, m.reference_px, m.moving_px,
-                              local_linear(mov_from_ref, m.reference_px), {});
+    const Mat2 linear = local_linear(mov_from_ref, m.reference_px);
+    refined[i] = refine_point(pair.reference, pair.moving, m.reference_px, m.moving_px, linear, {});
+    if (refined[i]) return;
+    refined[i] =
+        refine_point(pair.reference, pair.moving, m.reference_px, m.moving_px, linear, wide);
   });
   for (std::size_t i = 0; i < inliers.size(); ++i) {
     if (!refined[i]) continue;
@@ -219,6 +228,9 @@ std::optional<PairAlignment> align(const Frame& reference, const Frame& moving,
   PatchPair pair;
   reference.gray.convertTo(pair.reference, CV_32F, 1.0 / 255.0);
   moving.gray.convertTo(pair.moving, CV_32F, 1.0 / 255.0);
+  PatchPair smooth;
+  cv::GaussianBlur(pair.reference, smooth.reference, {}, kSmoothingPx);
+  cv::GaussianBlur(pair.moving, smooth.moving, {}, kSmoothingPx);
   for (int plane = 0; plane < kMaxPlanes && matches.size() >= enough; ++plane) {
     const auto word =
         random_words(seed, Purpose::recon_ransac, static_cast<std::uint32_t>(reference.index),
@@ -234,7 +246,8 @@ std::optional<PairAlignment> align(const Frame& reference, const Frame& moving,
       if (guess.affine) fit(pair, inliers, options, scale, result);
     }
     result.inliers += static_cast<int>(inliers.size());
-    refine(pair, inliers, *h, !guess.reference_points.empty(), result);
+    refine(smooth, inliers, *h, options.patch_radius_px * scale, !guess.reference_points.empty(),
+           result);
   }
   if (result.reference_px.size() < enough) return std::nullopt;
   return result;

@@ -1,5 +1,6 @@
 #include "recon/keyframes.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -8,9 +9,8 @@
 #include <future>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
 
-#include "core/check.h"
+#include "recon/flow.h"
 
 namespace rugae {
 namespace {
@@ -18,14 +18,7 @@ namespace {
 constexpr double kReferenceWidthPx = 640.0;  // of the threshold
 constexpr int kWorkWidthPx = 320;            // the mean magnitude needs no finer flow than this
 constexpr int kReadAhead = 8;                // frames prepared while others are compared
-constexpr int kCoarsestPx = 24;              // shorter side of the top of the flow's pyramid
-constexpr int kMaxLevels = 6;
-
-int levels_for(const cv::Size& size) {
-  int levels = 1;
-  for (int side = std::min(size.width, size.height) / 2; side >= kCoarsestPx; side /= 2) ++levels;
-  return std::min(levels, kMaxLevels);
-}
+constexpr std::size_t kAtOnce = 2;           // candidates compared at the same time
 
 double mean_magnitude(const cv::Mat& flow) {
   double sum = 0.0;
@@ -62,44 +55,54 @@ class Selection {
   Selection(double threshold_px, int max_gap, double px_per_flow)
       : threshold_px_(threshold_px), max_gap_(max_gap), px_per_flow_(px_per_flow) {}
 
-  void offer(const Candidate& frame) {
-    std::deque<Candidate> queue{frame};
-    while (!queue.empty()) {
-      const Candidate candidate = queue.front();
-      queue.pop_front();
+  void offer(const Candidate& frame) { queue_.push_back(frame); }
+
+  /// Compares what is waiting; without `all`, only while there is enough to do it side by side.
+  void run(bool all) {
+    while (!queue_.empty() && (all || queue_.size() >= kAtOnce)) {
       if (keys_.frames.empty()) {
-        accept(candidate, 0.0);
+        accept(next(), 0.0);
         continue;
       }
-      const double value = compare(candidate);
-      if (value >= threshold_px_) {
-        accept(candidate, value);
-        continue;
+      // Speculation: once a candidate becomes the reference, the values of those after it are void.
+      std::vector<double> values(std::min(queue_.size(), kAtOnce));
+      tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t i) {
+        values[i] = px_per_flow_ * mean_magnitude(farneback_flow(reference_.gray, queue_[i].gray));
+      });
+      for (const double value : values) {
+        if (decide(next(), value)) break;
       }
-      failed_.push_back(candidate);
-      values_.push_back(value);
-      if (static_cast<int>(failed_.size()) < max_gap_) continue;
-      // The frame with the largest value; those after it are compared again, with it.
-      const auto best = std::max_element(values_.begin(), values_.end()) - values_.begin();
-      const Candidate chosen = failed_[static_cast<std::size_t>(best)];
-      queue.insert(queue.begin(), failed_.begin() + best + 1, failed_.end());
-      accept(chosen, values_[static_cast<std::size_t>(best)]);
     }
   }
 
   Keyframes take() { return std::move(keys_); }
 
  private:
-  double compare(const Candidate& candidate) {
-    // The flow to the frame before is the first guess: displacements beyond the pyramid's reach
-    // grow frame by frame.
-    flow_ = farneback_flow(reference_.gray, candidate.gray, flow_);
-    return px_per_flow_ * mean_magnitude(flow_);
+  Candidate next() {
+    Candidate front = queue_.front();
+    queue_.pop_front();
+    return front;
+  }
+
+  // True when there is a new reference.
+  bool decide(const Candidate& candidate, double value) {
+    if (value >= threshold_px_) {
+      accept(candidate, value);
+      return true;
+    }
+    failed_.push_back(candidate);
+    values_.push_back(value);
+    if (static_cast<int>(failed_.size()) < max_gap_) return false;
+    // The frame with the largest value; those after it are compared again, with it.
+    const auto best = std::max_element(values_.begin(), values_.end()) - values_.begin();
+    const Candidate chosen = failed_[static_cast<std::size_t>(best)];
+    queue_.insert(queue_.begin(), failed_.begin() + best + 1, failed_.end());
+    accept(chosen, values_[static_cast<std::size_t>(best)]);
+    return true;
   }
 
   void accept(const Candidate& frame, double value) {
     reference_ = frame;
-    flow_.release();
     failed_.clear();
     values_.clear();
     keys_.frames.push_back(frame.index);
@@ -110,32 +113,13 @@ class Selection {
   int max_gap_;
   double px_per_flow_;
   Candidate reference_;
-  cv::Mat flow_;
+  std::deque<Candidate> queue_;
   std::vector<Candidate> failed_;
   std::vector<double> values_;
   Keyframes keys_;
 };
 
 }  // namespace
-
-cv::Mat farneback_flow(const cv::Mat& reference, const cv::Mat& moving, const cv::Mat& initial) {
-  check(reference.type() == CV_8U && moving.type() == CV_8U && reference.size() == moving.size(),
-        "optical flow: expected two 8-bit gray images of one size, found {} x {} and {} x {}",
-        reference.cols, reference.rows, moving.cols, moving.rows);
-  constexpr double kPyramidScale = 0.5;
-  constexpr int kWindowPx = 21, kIterations = 3;
-  constexpr int kPolynomialPx = 7;
-  constexpr double kPolynomialSigmaPx = 1.5;
-  cv::Mat flow;
-  int flags = 0;
-  if (!initial.empty()) {
-    flow = initial.clone();
-    flags |= cv::OPTFLOW_USE_INITIAL_FLOW;
-  }
-  cv::calcOpticalFlowFarneback(reference, moving, flow, kPyramidScale, levels_for(moving.size()),
-                               kWindowPx, kIterations, kPolynomialPx, kPolynomialSigmaPx, flags);
-  return flow;
-}
 
 Keyframes select_keyframes(const FrameSource& frames, const KeyframeOptions& options,
                            Progress& progress) {
@@ -151,10 +135,12 @@ Keyframes select_keyframes(const FrameSource& frames, const KeyframeOptions& opt
         std::async(std::launch::async, [&] { return prepare(frames, next, shrink); });
     for (const Candidate& frame : block) {
       selection.offer(frame);
+      selection.run(false);
       progress.step();
     }
     block = ahead.get();
   }
+  selection.run(true);
   Keyframes keys = selection.take();
   progress.end(fmt::format("{} of {} frames", keys.frames.size(), frames.size()));
   return keys;

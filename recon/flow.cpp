@@ -1,0 +1,137 @@
+#include "recon/flow.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+#include <utility>
+#include <vector>
+
+#include "core/check.h"
+
+namespace rugae {
+namespace {
+
+constexpr double kLightShare = 1.0 / 45.0;  // blur of the light over the width
+constexpr int kCoarseWidthPx = 80;
+constexpr int kCellPx = 10;   // at the coarse width; blocks are two cells wide and overlap by half
+constexpr int kReachPx = 20;  // at the coarse width
+constexpr int kSupportRounds = 2;
+constexpr int kSupportPx = 2;  // neighbouring blocks may differ by this in their motion
+constexpr float kSupportWeight = 0.5F;
+
+// The scores of a block for every motion up to the reach.
+using Scores = std::vector<cv::Mat>;
+
+// A block's score gains by the best of its neighbours' scores at nearly the same motion: a block
+// without texture moves with those around it.
+Scores supported(const Scores& scores, int columns, int rows) {
+  Scores widened, result;
+  const int side = 2 * kSupportPx + 1;
+  for (const cv::Mat& s : scores) {
+    widened.emplace_back();
+    cv::dilate(s, widened.back(), cv::Mat::ones(side, side, CV_8U));
+  }
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      cv::Mat sum = scores[static_cast<std::size_t>(y * columns + x)].clone();
+      for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+        const int u = x + dx, v = y + dy;
+        if (u < 0 || v < 0 || u >= columns || v >= rows) continue;
+        sum += kSupportWeight * widened[static_cast<std::size_t>(v * columns + u)];
+      }
+      result.push_back(sum / 3.0);
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+cv::Mat even_light(const cv::Mat& gray) {
+  constexpr double kContrast = 40.0, kMiddle = 128.0;  // of the 8-bit result
+  constexpr double kFloor = 1.0;  // grey levels: below, noise would be blown up
+  const double sigma = std::max(2.0, kLightShare * gray.cols);
+  cv::Mat value, mean, deviation;
+  gray.convertTo(value, CV_32F);
+  cv::GaussianBlur(value, mean, {}, sigma);
+  value -= mean;
+  cv::GaussianBlur(value.mul(value), deviation, {}, sigma);
+  cv::sqrt(deviation, deviation);
+  const cv::Mat even = value / (deviation + kFloor);
+  cv::Mat result;
+  even.convertTo(result, CV_8U, kContrast, kMiddle);
+  return result;
+}
+
+cv::Mat coarse_flow(const cv::Mat& reference, const cv::Mat& moving) {
+  const double shrink = std::max(1.0, reference.cols / static_cast<double>(kCoarseWidthPx));
+  const cv::Size size(static_cast<int>(std::lround(reference.cols / shrink)),
+                      static_cast<int>(std::lround(reference.rows / shrink)));
+  const int columns = size.width / kCellPx - 1, rows = size.height / kCellPx - 1;
+  cv::Mat flow(reference.size(), CV_32FC2, cv::Scalar(0.0, 0.0));
+  if (columns < 2 || rows < 2) return flow;
+
+  cv::Mat a, b, wide;
+  cv::resize(reference, a, size, 0, 0, cv::INTER_AREA);
+  cv::resize(moving, b, size, 0, 0, cv::INTER_AREA);
+  cv::copyMakeBorder(even_light(b), wide, kReachPx, kReachPx, kReachPx, kReachPx,
+                     cv::BORDER_CONSTANT, cv::Scalar(128));
+  a = even_light(a);
+  Scores scores;
+  const int block = 2 * kCellPx;
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      const cv::Rect at(x * kCellPx, y * kCellPx, block, block);
+      const cv::Rect around(at.x, at.y, block + 2 * kReachPx, block + 2 * kReachPx);
+      scores.emplace_back();
+      cv::matchTemplate(wide(around), a(at), scores.back(), cv::TM_CCOEFF_NORMED);
+    }
+  }
+  for (int round = 0; round < kSupportRounds; ++round) scores = supported(scores, columns, rows);
+
+  // The best motion of each block, at its centre; linear between the centres.
+  cv::Mat motions(rows, columns, CV_32FC2);
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      cv::Point best;
+      cv::minMaxLoc(scores[static_cast<std::size_t>(y * columns + x)], nullptr, nullptr, nullptr,
+                    &best);
+      motions.at<cv::Vec2f>(y, x) = {static_cast<float>((best.x - kReachPx) * shrink),
+                                     static_cast<float>((best.y - kReachPx) * shrink)};
+    }
+  }
+  for (int y = 0; y < flow.rows; ++y) {
+    const double v = std::clamp(((y + 0.5) / shrink - kCellPx) / kCellPx, 0.0, rows - 1.001);
+    const int iv = static_cast<int>(v);
+    const float fv = static_cast<float>(v - iv);
+    for (int x = 0; x < flow.cols; ++x) {
+      const double u = std::clamp(((x + 0.5) / shrink - kCellPx) / kCellPx, 0.0, columns - 1.001);
+      const int iu = static_cast<int>(u);
+      const float fu = static_cast<float>(u - iu);
+      const auto at = [&](int i, int j) { return motions.at<cv::Vec2f>(iv + j, iu + i); };
+      flow.at<cv::Vec2f>(y, x) = (1 - fv) * ((1 - fu) * at(0, 0) + fu * at(1, 0)) +
+                                 fv * ((1 - fu) * at(0, 1) + fu * at(1, 1));
+    }
+  }
+  return flow;
+}
+
+cv::Mat farneback_flow(const cv::Mat& reference, const cv::Mat& moving, const cv::Mat& initial) {
+  check(reference.type() == CV_8U && moving.type() == CV_8U && reference.size() == moving.size(),
+        "optical flow: expected two 8-bit gray images of one size, found {} x {} and {} x {}",
+        reference.cols, reference.rows, moving.cols, moving.rows);
+  constexpr double kPyramidScale = 0.5;
+  constexpr int kLevels = 2;  // the start is within a few pixels: a taller pyramid adds nothing
+  constexpr int kWindowPx = 21, kIterations = 3;
+  constexpr int kPolynomialPx = 7;
+  constexpr double kPolynomialSigmaPx = 1.5;
+  cv::Mat flow = initial.empty() ? coarse_flow(reference, moving) : initial.clone();
+  cv::calcOpticalFlowFarneback(even_light(reference), even_light(moving), flow, kPyramidScale,
+                               kLevels, kWindowPx, kIterations, kPolynomialPx, kPolynomialSigmaPx,
+                               cv::OPTFLOW_USE_INITIAL_FLOW);
+  return flow;
+}
+
+}  // namespace rugae
