@@ -9,6 +9,7 @@
 #include "core/files.h"
 #include "core/units.h"
 #include "dataset/image_io.h"
+#include "recon/flow.h"
 #include "recon/keyframes.h"
 #include "recon/preprocess/reflections.h"
 

@@ -8,6 +8,7 @@
 #include <opencv2/core/eigen.hpp>
 
 #include "recon/bundle.h"
+#include "recon/flow_guess.h"
 #include "recon/tracks.h"
 
 namespace rugae {
@@ -18,6 +19,7 @@ constexpr double kRansacConfidence = 0.9999;
 constexpr double kInlierHubers = 3.0;     // an inlier is within this many times huber_px
 constexpr double kMinInlierShare = 0.25;  // fewer: chance could have found them
 constexpr int kMinPoints = 6;
+constexpr std::size_t kMaxPoints = 400;  // followed into a frame: more adds time and no precision
 constexpr int kRefinements = 2;
 constexpr int kFramesAtOnce = 16;  // between two steps of the progress line
 
@@ -27,31 +29,46 @@ struct Sighted {
   std::vector<Vec2> rays;
 };
 
-// Follows the triangulated points of one key frame into a frame.
-void follow(const FrameSource& frames, const Structure& structure, int keyframe,
-            const Frame& moving, const AlignOptions& align_options, std::uint64_t seed,
-            Sighted& sighted) {
-  AlignGuess guess;
-  std::vector<const Track*> tracks;
+// Follows the triangulated points of one key frame into a frame that is thought to be near
+// `cam_from_world`.
+Sighted follow(const FrameSource& frames, const Structure& structure, int keyframe,
+               const Frame& moving, const std::optional<Rigid3>& cam_from_world,
+               const AlignOptions& align_options, std::uint64_t seed) {
+  std::vector<std::pair<const Track*, Vec2>> seen;
   for (const Track& track : structure.tracks) {
     if (!track.triangulated) continue;
-    for (const auto& o : track.observations) {
-      if (o.keyframe != keyframe || !o.inlier) continue;
-      guess.reference_points.push_back(o.pixel);
-      tracks.push_back(&track);
-    }
+    for (const auto& o : track.observations)
+      if (o.keyframe == keyframe && o.inlier) seen.emplace_back(&track, o.pixel);
   }
-  if (static_cast<int>(tracks.size()) < kMinPoints) return;
+  AlignGuess guess;
+  guess.affine = false;
+  std::vector<const Track*> tracks;
+  std::vector<Vec2> from, to;
+  const std::size_t stride = 1 + seen.size() / kMaxPoints;
+  for (std::size_t i = 0; i < seen.size(); i += stride) {
+    const auto& [track, pixel] = seen[i];
+    guess.reference_points.push_back(pixel);
+    tracks.push_back(track);
+    if (!cam_from_world) continue;
+    const auto there = frames.lens().project(*cam_from_world * track->point);
+    if (!there) continue;
+    from.push_back(pixel);
+    to.push_back(*there);
+  }
+  Sighted sighted;
+  if (static_cast<int>(tracks.size()) < kMinPoints) return sighted;
   const Frame reference = frames.frame(structure.frames[keyframe]);
+  guess.flow = guess_flow(from, to, 1.0, reference.gray.size());
   const auto pair = align(reference, moving, align_options,
                           pair_seed(seed, reference.index, moving.index), guess);
-  if (!pair) return;
+  if (!pair) return sighted;
   for (std::size_t i = 0; i < pair->point_index.size(); ++i) {
     const auto ray = ray_of(frames.lens(), pair->moving_px[i]);
     if (!ray) continue;
     sighted.points.push_back(tracks[pair->point_index[i]]->point);
     sighted.rays.push_back(*ray);
   }
+  return sighted;
 }
 
 }  // namespace
@@ -140,14 +157,27 @@ std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
       const Frame moving = frames.frame(f);
       const auto after = static_cast<std::size_t>(
           std::lower_bound(placed_frames.begin(), placed_frames.end(), f) - placed_frames.begin());
-      Sighted sighted;
-      if (after > 0)
-        follow(frames, structure, placed_keyframes[after - 1], moving, align_options, seed,
-               sighted);
-      if (after < placed_keyframes.size())
-        follow(frames, structure, placed_keyframes[after], moving, align_options, seed, sighted);
-      if (const auto p = place_by_points(sighted.points, sighted.rays, focal_px, options))
+      // Between two key frames the pose is thought to lie on the way from one to the other; the
+      // nearer one is asked first.
+      std::vector<std::size_t> anchors;
+      if (after > 0) anchors.push_back(after - 1);
+      if (after < placed_frames.size()) anchors.push_back(after);
+      std::optional<Rigid3> expected;
+      if (anchors.size() == 2) {
+        const int a = placed_frames[after - 1], b = placed_frames[after];
+        if (f - a > b - f) std::swap(anchors[0], anchors[1]);
+        expected = interpolate(poses[a]->inverse(), poses[b]->inverse(),
+                               static_cast<double>(f - a) / (b - a))
+                       .inverse();
+      }
+      for (const std::size_t anchor : anchors) {
+        const Sighted sighted = follow(frames, structure, placed_keyframes[anchor], moving,
+                                       expected, align_options, seed);
+        const auto p = place_by_points(sighted.points, sighted.rays, focal_px, options);
+        if (!p) continue;
         poses[f] = p->cam_from_world;
+        break;
+      }
     });
     progress.step(end - begin);
   }

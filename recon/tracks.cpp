@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "core/random.h"
+#include "recon/flow_guess.h"
 
 namespace rugae {
 namespace {
@@ -62,6 +63,21 @@ std::vector<Vec2> corners(const Frame& frame, double spacing_px) {
   points.reserve(found.size());
   for (const cv::Point2f& p : found) points.emplace_back(p.x + 0.5, p.y + 0.5);
   return points;
+}
+
+// The flow from pair.moving to `next` when the motion of the pair goes on at its speed.
+cv::Mat continued(const PairAlignment& pair, int next, cv::Size size) {
+  const double scale = static_cast<double>(next - pair.moving) / (pair.moving - pair.reference);
+  std::vector<Vec2> to(pair.moving_px.size());
+  for (std::size_t i = 0; i < to.size(); ++i)
+    to[i] = pair.moving_px[i] + (pair.moving_px[i] - pair.reference_px[i]);
+  return guess_flow(pair.moving_px, to, scale, size);
+}
+
+// The flow from pair.reference to `next` likewise.
+cv::Mat continued_from(const PairAlignment& pair, int next, cv::Size size) {
+  const double scale = static_cast<double>(next - pair.reference) / (pair.moving - pair.reference);
+  return guess_flow(pair.reference_px, pair.moving_px, scale, size);
 }
 
 }  // namespace
@@ -145,31 +161,45 @@ std::vector<Track> TrackChain::finish() {
 Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
                        const AlignOptions& align_options, const TrackOptions& options,
                        std::uint64_t seed, Progress& progress) {
-  const int n = static_cast<int>(keyframes.frames.size());
+  const std::vector<int>& at = keyframes.frames;
+  const int n = static_cast<int>(at.size());
   const double spacing_px = options.spacing_px * frames.lens().width / kReferenceWidth;
   progress.begin("pairwise alignment", n);
   Followed followed;
   TrackChain chain;
-  std::deque<Frame> window;  // key frames k to k + neighbours
+  std::deque<Frame> window;               // key frames k to k + neighbours
+  std::optional<PairAlignment> previous;  // k - 1 to k
   int failed = 0;
   for (int k = 0; k < n; ++k) {
-    const int last = std::min(n - 1, k + align_options.neighbours);
-    while (static_cast<int>(window.size()) <= last - k)
-      window.push_back(frames.frame(keyframes.frames[k + static_cast<int>(window.size())]));
-    AlignGuess guess;
-    guess.reference_points = chain.starts(k, corners(window.front(), spacing_px), spacing_px);
-    std::vector<std::optional<PairAlignment>> found(last - k);
-    tbb::parallel_for(0, last - k, [&](int i) {
-      const Frame& moving = window[i + 1];
-      found[i] = align(window.front(), moving, align_options,
-                       pair_seed(seed, window.front().index, moving.index), guess);
-    });
-    for (int i = 0; i < last - k; ++i) {
+    const int count = std::min(n - 1 - k, align_options.neighbours);
+    while (static_cast<int>(window.size()) <= count)
+      window.push_back(frames.frame(at[k + static_cast<int>(window.size())]));
+    const Frame& reference = window.front();
+    const std::vector<Vec2> points = chain.starts(k, corners(reference, spacing_px), spacing_px);
+    std::vector<std::optional<PairAlignment>> found(count);
+    const auto try_to = [&](int i, const cv::Mat& guess) {
+      const AlignGuess known{points, guess, i == 0};
+      found[i] = align(reference, window[i + 1], align_options,
+                       pair_seed(seed, reference.index, window[i + 1].index), known);
+    };
+    if (count > 0) {
+      // The next key frame: whatever the motion, or else as it was before.
+      try_to(0, {});
+      if (!found[0] && previous) try_to(0, continued(*previous, at[k + 1], reference.gray.size()));
+      // Those after it: the motion to the next goes on.
+      tbb::parallel_for(1, std::max(1, count), [&](int i) {
+        if (found[0]) try_to(i, continued_from(*found[0], at[k + 1 + i], reference.gray.size()));
+        if (!found[i]) try_to(i, {});
+      });
+    }
+    previous.reset();
+    for (int i = 0; i < count; ++i) {
       if (!found[i]) {
         ++failed;
         continue;
       }
       chain.add(k + 1 + i, found[i]->point_index, found[i]->moving_px, spacing_px);
+      if (i == 0) previous = found[0];
       followed.pairs.push_back(std::move(*found[i]));
     }
     window.pop_front();
