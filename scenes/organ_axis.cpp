@@ -14,8 +14,9 @@ namespace rugae {
 namespace {
 
 constexpr std::size_t kMaxBalls = 256;
-// Balls farther than this many softness lengths beyond the nearest weigh less than 1e-6: left out.
-constexpr double kReach = 14.0;
+// Balls farther than this many softness lengths beyond the nearest weigh less than 1.3e-4: left
+// out, which moves the surface by less than 1.3e-4 softness lengths.
+constexpr double kReach = 9.0;
 
 // Catmull-Rom: the cubic through p1 and p2 with tangents (p2 - p0) / 2 and (p3 - p1) / 2.
 template <typename T>

@@ -81,9 +81,9 @@ void StomachOptions::check(const std::string& where) const {
 
 StomachShape::StomachShape(double scale)
     : scale_(scale),
-      axis_(scaled(std::begin(kAxis), std::end(kAxis), scale), 4.0 * scale, 4.0 * scale,
+      axis_(scaled(std::begin(kAxis), std::end(kAxis), scale), 6.0 * scale, 4.0 * scale,
             kFlattening, Vec3::UnitY()),
-      oesophagus_(scaled(std::begin(kOesophagus), std::end(kOesophagus), scale), 3.0 * scale,
+      oesophagus_(scaled(std::begin(kOesophagus), std::end(kOesophagus), scale), 4.0 * scale,
                   2.0 * scale, 1.0, Vec3::UnitY()) {}
 
 double StomachShape::distance_mm(const Vec3& p, Vec3* gradient) const {

@@ -122,6 +122,14 @@ TEST_F(SceneFiles, ThePresetIsAStomach) {
             "resolution is 'medum', expected one of: coarse, medium, fine; did you mean 'medium'?");
 }
 
+TEST_F(SceneFiles, ResolutionsHaveTheTrianglesTheyPromise) {
+  EXPECT_NEAR(static_cast<double>(load("stomach", "coarse").wall.triangles.size()), 50e3, 5e3);
+  EXPECT_NEAR(static_cast<double>(load("stomach", "medium").wall.triangles.size()), 250e3, 25e3);
+  const Scene fine = load("stomach", "fine");
+  EXPECT_NEAR(static_cast<double>(fine.wall.triangles.size()), 1e6, 1e5);
+  expect_whole(fine);
+}
+
 TEST_F(SceneFiles, YamlReachesTheStomach) {
   const auto file = write("half.yaml", std::string("scale: 0.5\nrelief: {rugae_height_mm: 0}\n"));
   const Scene half = load(file);
