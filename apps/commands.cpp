@@ -66,10 +66,10 @@ void add_simulate(CLI::App& app) {
     a->options.labels = !a->no_labels;
     Progress progress;
     const SimulateResult r = simulate(a->options, a->out, progress);
-    const int rendered = r.frames - r.skipped;
-    const double rate = r.wall_s > 0.0 ? rendered / r.wall_s : 0.0;
+    const int frames = r.frames + r.skipped;
+    const double rate = r.wall_s > 0.0 ? r.frames / r.wall_s : 0.0;
     const Json json = {{"dataset", a->out.string()},
-                       {"frames", r.frames},
+                       {"frames", frames},
                        {"skipped", r.skipped},
                        {"path_length_mm", r.path_length_mm},
                        {"min_clearance_mm", r.min_clearance_mm},
@@ -87,7 +87,7 @@ void add_simulate(CLI::App& app) {
                       "second\nthread-seconds: trace {:.1f}, shade {:.1f}, labels {:.1f}, sensor "
                       "{:.1f}, encode {:.1f}, "
                       "write {:.1f}",
-                      a->out.string(), r.frames, r.skipped, r.path_length_mm, r.min_clearance_mm,
+                      a->out.string(), frames, r.skipped, r.path_length_mm, r.min_clearance_mm,
                       rate, r.trace_s, r.shade_s, r.label_s, r.sensor_s, r.encode_s, r.write_s));
   });
 }

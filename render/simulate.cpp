@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/check.h"
+#include "core/files.h"
 #include "core/units.h"
 #include "dataset/writer.h"
 #include "render/exposure_log.h"
@@ -178,6 +179,7 @@ SimulateResult simulate(const SimulateOptions& options, const std::filesystem::p
   progress.begin("scene");
   const Camera camera = load_camera(options.camera);
   const TrajectoryOptions trajectory = load_trajectory(options.trajectory);
+  make_folder(out);  // a folder that cannot be is said before the long work, not after
   const Scene scene = load_scene({options.scene, options.seed, options.resolution, trajectory.oil});
   progress.end(fmt::format("{} triangles", scene.wall.triangles.size()));
 
