@@ -71,8 +71,8 @@ double srgb_from_linear(double linear) {
 // g1 = m / s^3 and excess g2 = m / s^4; electrons = m + s w.
 float ElectronNoise::smooth(float mean_e, float z) const {
   const float variance = mean_e + static_cast<float>(read_e_ * read_e_);
-  const float s = std::sqrt(variance), skew = mean_e / (variance * s),
-              excess = mean_e / (variance * variance);
+  const float s = std::sqrt(variance), inverse = 1.0f / variance;
+  const float excess = mean_e * inverse * inverse, skew = excess * s;
   const float z2 = z * z;
   const float w = z + skew * (z2 - 1.0f) * (1.0f / 6.0f) +
                   z * (excess * (z2 - 3.0f) * (1.0f / 24.0f) -

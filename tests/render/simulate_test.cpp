@@ -213,7 +213,7 @@ TEST_F(Simulate, SaysWhatIsWrong) {
   EXPECT_EQ(text_of(options, root_ / "x"), "frames is 1, expected at least 2");
   options = options_;
   options.only_frame = 7;
-  EXPECT_EQ(text_of(options, root_ / "x"), "only-frame is 7, but there are 7 frames");
+  EXPECT_EQ(text_of(options, root_ / "y"), "only-frame is 7, but there are 7 frames");
   options = options_;
   options.threads = -1;
   EXPECT_EQ(text_of(options, root_ / "x"), "threads is -1, expected at least 0");
