@@ -141,14 +141,15 @@ json surface_errors(const Estimate& estimate, const TriangleMesh& seen, const Po
   if (seen.empty()) out["note"] = "no part of the wall was seen";
   if (out["note"] != "") return out;
   const TriangleMesh placed = transformed(estimate.map, poses.sim3->truth_from_estimate);
-  out["trajectory_aligned"] = surface_json(surface_error(placed, seen));
-  constexpr std::size_t kMapPoints = 20'000, kWallPoints = 100'000;  // for ICP alone
+  const TrueSurface truth(seen);
+  out["trajectory_aligned"] = surface_json(truth.error_of(placed));
+  constexpr std::size_t kMapPoints = 5'000, kWallPoints = 50'000;  // for ICP alone
   const std::vector<Vec3> of_map = sample_surface(placed, kMapPoints);
   const std::vector<Vec3> of_wall = sample_surface(seen, kWallPoints);
   for (const bool with_scale : {false, true}) {
     const IcpResult found = icp(of_map, of_wall, {.with_scale = with_scale});
     if (!found.converged) continue;
-    const auto error = surface_error(transformed(placed, found.target_from_source), seen);
+    const auto error = truth.error_of(transformed(placed, found.target_from_source));
     out[with_scale ? "icp_scaled" : "icp_aligned"] = surface_json(error);
     if (!with_scale) out["icp"] = transform_json(found.target_from_source);
   }

@@ -54,7 +54,10 @@ std::vector<Vec3> sample_surface(const TriangleMesh& mesh, std::size_t count) {
 }
 
 std::vector<double> distances_mm(const std::vector<Vec3>& points, const TriangleMesh& mesh) {
-  const ClosestPoint closest(mesh);
+  return distances_mm(points, ClosestPoint(mesh));
+}
+
+std::vector<double> distances_mm(const std::vector<Vec3>& points, const ClosestPoint& closest) {
   std::vector<double> distances(points.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 256),
                     [&](const tbb::blocked_range<std::size_t>& range) {
@@ -64,14 +67,18 @@ std::vector<double> distances_mm(const std::vector<Vec3>& points, const Triangle
   return distances;
 }
 
-std::optional<SurfaceError> surface_error(const TriangleMesh& estimate, const TriangleMesh& truth,
-                                          const SurfaceOptions& options) {
-  options.check();
-  const std::vector<Vec3> of_estimate = sample_surface(estimate, options.samples);
-  const std::vector<Vec3> of_truth = sample_surface(truth, options.samples);
-  if (of_estimate.empty() || of_truth.empty()) return std::nullopt;
-  const std::vector<double> to_truth = distances_mm(of_estimate, truth);
-  const std::vector<double> to_estimate = distances_mm(of_truth, estimate);
+TrueSurface::TrueSurface(const TriangleMesh& truth, const SurfaceOptions& options)
+    : options_(options) {
+  options_.check();
+  samples_ = sample_surface(truth, options_.samples);
+  if (!samples_.empty()) closest_.emplace(truth);
+}
+
+std::optional<SurfaceError> TrueSurface::error_of(const TriangleMesh& estimate) const {
+  const std::vector<Vec3> of_estimate = sample_surface(estimate, options_.samples);
+  if (of_estimate.empty() || samples_.empty()) return std::nullopt;
+  const std::vector<double> to_truth = distances_mm(of_estimate, *closest_);
+  const std::vector<double> to_estimate = distances_mm(samples_, estimate);
 
   SurfaceError error;
   error.estimate_to_truth_mm = error_stats(to_truth);
@@ -79,7 +86,7 @@ std::optional<SurfaceError> surface_error(const TriangleMesh& estimate, const Tr
   error.chamfer_mean_mm = 0.5 * (error.estimate_to_truth_mm.mean + error.truth_to_estimate_mm.mean);
   error.chamfer_median_mm =
       0.5 * (error.estimate_to_truth_mm.median + error.truth_to_estimate_mm.median);
-  for (const double threshold : options.thresholds_mm) {
+  for (const double threshold : options_.thresholds_mm) {
     Thresholded at;
     at.threshold_mm = threshold;
     at.precision = share_within(to_truth, threshold);
@@ -89,6 +96,11 @@ std::optional<SurfaceError> surface_error(const TriangleMesh& estimate, const Tr
     error.at.push_back(at);
   }
   return error;
+}
+
+std::optional<SurfaceError> surface_error(const TriangleMesh& estimate, const TriangleMesh& truth,
+                                          const SurfaceOptions& options) {
+  return TrueSurface(truth, options).error_of(estimate);
 }
 
 }  // namespace rugae

@@ -19,6 +19,7 @@ std::vector<Vec3> sample_surface(const TriangleMesh& mesh, std::size_t count);
 /// Distances, mm, from each point to the nearest place on the mesh (on triangles, not vertices),
 /// in the order of the points.
 std::vector<double> distances_mm(const std::vector<Vec3>& points, const TriangleMesh& mesh);
+std::vector<double> distances_mm(const std::vector<Vec3>& points, const ClosestPoint& closest);
 
 /// At one threshold tau: precision is the share of the estimate within tau of the truth, recall
 /// the share of the truth within tau of the estimate, F their harmonic mean. Knapitsch et al.,
@@ -42,7 +43,20 @@ struct SurfaceError {
   std::vector<Thresholded> at;
 };
 
-/// Both meshes in mm and in one world. Empty when either has no area.
+/// The true surface, prepared once for many estimates. Keeps a reference to the mesh.
+class TrueSurface {
+ public:
+  explicit TrueSurface(const TriangleMesh& truth, const SurfaceOptions& options = {});
+  /// Both meshes in mm and in one world. Empty when either has no area.
+  std::optional<SurfaceError> error_of(const TriangleMesh& estimate) const;
+
+ private:
+  SurfaceOptions options_;
+  std::vector<Vec3> samples_;
+  std::optional<ClosestPoint> closest_;
+};
+
+/// The same for one estimate.
 std::optional<SurfaceError> surface_error(const TriangleMesh& estimate, const TriangleMesh& truth,
                                           const SurfaceOptions& options = {});
 

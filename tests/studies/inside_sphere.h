@@ -84,7 +84,7 @@ inline void write_dataset(const std::filesystem::path& root) {
   info.text = "{}";
   DatasetWriter writer(root, info);
   const PoseTrack poses = track();
-  writer.write_scene(camera(), poses, shapes::sphere(kRadius_mm, 60));
+  writer.write_scene(camera(), poses, shapes::sphere(kRadius_mm, 40));
   for (int i = 0; i < kFrames; ++i) {
     const Rigid3* next = i + 1 < kFrames ? &poses[i + 1].world_from_camera : nullptr;
     const FrameTruth truth = labels(poses[i].world_from_camera, next);
@@ -119,7 +119,7 @@ inline void write_estimate_of_truth(const std::filesystem::path& root, double un
                                            : FrameState::resected);
     estimate.world_from_camera.push_back(map_from_world * poses[i].world_from_camera);
   }
-  estimate.map = shapes::sphere(radius_mm, 60);
+  estimate.map = shapes::sphere(radius_mm, 40);
   for (Vec3& v : estimate.map.vertices) v = map_from_world * v;
   std::filesystem::create_directories(EstimateLayout{root}.depth_folder());
   for (int i = 0; i < kFrames; i += 3)

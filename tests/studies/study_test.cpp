@@ -1,0 +1,100 @@
+#include "studies/study.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "core/files.h"
+#include "tests/studies/temporary_folder.h"
+
+namespace rugae {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+// A small camera on a short path: the whole loop in seconds.
+class Study : public TemporaryFolder {
+ protected:
+  void SetUp() override {
+    TemporaryFolder::SetUp();
+    write_atomic(folder_ / "small.yaml",
+                 "name: small\nframes_in_paper: 0\ndiameter_mm: 5\n"
+                 "lens: {model: brown_conrady, width: 160, height: 120, horizontal_fov_deg: 90}\n"
+                 "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 10000, "
+                 "read_noise_e: 5, shutter: global}\n");
+    write_atomic(folder_ / "short.yaml", "like: \"1\"\nlength_cm: 4\npasses: 1\n");
+  }
+
+  fs::path write_study(const std::string& more) {
+    const fs::path file = folder_ / "study.yaml";
+    write_atomic(file, fmt::format("title: Tiny\nresolution: coarse\nframes: 12\n"
+                                   "cameras: [{0}/small.yaml]\ntrajectories: [{0}/short.yaml]\n{1}",
+                                   folder_.string(), more));
+    return file;
+  }
+
+  StudyResult run(const fs::path& file) {
+    Progress progress(Progress::Output::silent);
+    return run_study(file, folder_ / "out", progress);
+  }
+
+  std::string unchanging() {  // every file below the datasets and estimates, with its time
+    std::vector<std::string> lines;
+    for (const char* part : {"datasets", "estimates", "metrics"})
+      for (const auto& entry : fs::recursive_directory_iterator(folder_ / "out" / part))
+        lines.push_back(fmt::format("{} {}", entry.path().string(),
+                                    entry.last_write_time().time_since_epoch().count()));
+    std::ranges::sort(lines);
+    std::string text;
+    for (const std::string& line : lines) text += line + "\n";
+    return text;
+  }
+};
+
+TEST_F(Study, RunsTheLoopOnceAndKeepsWhatIsFinished) {
+  const fs::path file = write_study("");
+  const StudyResult first = run(file);
+  EXPECT_EQ(first.cells, 1);
+  EXPECT_TRUE(first.failed_gates.empty());
+  const std::string page = read_text(first.report);
+  EXPECT_NE(page.find("Inside the stomach"), std::string::npos);
+  EXPECT_EQ(page.find("http"), std::string::npos);
+  const json results = json::parse(read_text(folder_ / "out" / "results.json"));
+  const json& cell = results.at("cells").at(0);
+  EXPECT_EQ(cell.at("metrics").at("tracking").at("frames"), 12);
+  EXPECT_EQ(cell.at("metrics").at("simulation").at("frames"), 12);
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "datasets" / cell.at("dataset") / "manifest.sha256"));
+  EXPECT_EQ(read_text(folder_ / "out" / "table.csv").rfind("camera,trajectory,method", 0), 0u);
+
+  const std::string before = unchanging();
+  run(file);
+  EXPECT_EQ(unchanging(), before);
+
+  // Another gate changes no cell; one that fails is told with its reason.
+  const StudyResult gated = run(write_study(
+      "gates: [{metric: tracking.tracked_share, above: 1.5, reason: more than all}]\n"));
+  EXPECT_EQ(unchanging(), before);
+  ASSERT_EQ(gated.failed_gates.size(), 1u);
+  EXPECT_NE(gated.failed_gates[0].find("expected above 1.5: more than all"), std::string::npos);
+
+  // Losing the metrics, as a killed run does, makes those anew and nothing else.
+  fs::remove_all(folder_ / "out" / "metrics");
+  run(file);
+  EXPECT_EQ(
+      json::parse(read_text(folder_ / "out" / "results.json")).at("cells").at(0).at("dataset"),
+      cell.at("dataset"));
+}
+
+TEST_F(Study, AnUnknownKeyStopsItBeforeAnyWork) {
+  const fs::path file = write_study("reconn: {}\n");
+  try {
+    run(file);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.what(), file.string() + ":6:1: unknown key 'reconn'; did you mean 'recon'?");
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+}
+
+}  // namespace
+}  // namespace rugae
