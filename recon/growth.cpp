@@ -16,7 +16,10 @@ namespace {
 constexpr double kTwoViewHubers = 1.5;  // RANSAC threshold of the start, times huber_px
 constexpr double kOutlierHubers = 4.0;  // observations further off than this do not belong
 constexpr int kStartWindow = 12;        // key frames a starting pair may be apart
-constexpr int kStartsTried = 6;         // first key frames of starting pairs looked at
+constexpr int kStartsLookedAt = 12;     // first key frames of starting pairs
+constexpr int kStartsTried = 6;         // pairs whose relative pose is estimated
+constexpr int kStartsTriedInVain = 24;  // ... while none has been found
+constexpr double kGoodMotionPx = 60.0;  // more motion than this does not rank a pair higher
 constexpr int kMinStartInliers = 40;
 constexpr double kGoodParallaxRad = 0.06;  // more than this adds nothing to a start: 3.4 degrees
 constexpr int kLocalKeyframes = 6;         // adjusted after each placement
@@ -78,33 +81,57 @@ struct Start {
   Shared shared;
 };
 
+// Median motion of the shared tracks between two key frames, px: parallax cannot be larger.
+double median_motion_px(const Shared& shared, double focal_px) {
+  std::vector<double> motions;
+  for (std::size_t i = 0; i < shared.first.size(); ++i)
+    motions.push_back(focal_px * (shared.second[i] - shared.first[i]).norm());
+  const auto middle = motions.begin() + static_cast<std::ptrdiff_t>(motions.size() / 2);
+  std::nth_element(motions.begin(), middle, motions.end());
+  return *middle;
+}
+
 // The pair whose inliers and parallax together are best: many points, seen from places far enough
-// apart that their depth is known.
+// apart that their depth is known. Pairs are ranked by what they share and how far it moved, and
+// only the first of them are looked at closely.
 std::optional<Start> best_start(const Structure& s, const std::vector<char>& available,
                                 double focal_px, const BundleOptions& options) {
-  std::optional<Start> best;
-  double best_score = 0.0;
   std::vector<int> keys;
   for (int k = 0; k < static_cast<int>(available.size()); ++k)
     if (available[k]) keys.push_back(k);
+  struct Ranked {
+    double score;
+    int first, second;
+  };
+  std::vector<Ranked> ranked;
   // First members are spread over the segment, so that one bad stretch cannot spoil the start.
   const int n = static_cast<int>(keys.size());
-  const int stride = std::max(1, (n - 1) / kStartsTried);
+  const int stride = std::max(1, (n - 1) / kStartsLookedAt);
   for (int i = 0; i + 1 < n; i += stride) {
     for (int j = i + 1; j < n && keys[j] <= keys[i] + kStartWindow; ++j) {
-      Shared shared = shared_tracks(s, keys[i], keys[j]);
+      const Shared shared = shared_tracks(s, keys[i], keys[j]);
       if (static_cast<int>(shared.tracks.size()) < kMinStartInliers) break;
-      auto view =
-          two_view(shared.first, shared.second, focal_px, kTwoViewHubers * options.huber_px);
-      if (!view || view->inliers < kMinStartInliers) continue;
-      if (!(view->median_parallax_rad >= options.min_parallax_rad)) continue;
-      const double score = view->inliers * std::min(view->median_parallax_rad, kGoodParallaxRad) *
-                           view->inliers / static_cast<double>(shared.tracks.size());
-      if (score > best_score) {
-        best_score = score;
-        best = Start{keys[i], keys[j], std::move(*view), std::move(shared)};
-      }
+      const double motion = std::min(1.0, median_motion_px(shared, focal_px) / kGoodMotionPx);
+      ranked.push_back({motion * static_cast<double>(shared.tracks.size()), keys[i], keys[j]});
     }
+  }
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const Ranked& a, const Ranked& b) { return a.score > b.score; });
+  std::optional<Start> best;
+  double best_score = 0.0;
+  int tried = 0;
+  for (const Ranked& pair : ranked) {
+    if (++tried > (best ? kStartsTried : kStartsTriedInVain)) break;
+    Shared shared = shared_tracks(s, pair.first, pair.second);
+    auto view = two_view(shared.first, shared.second, focal_px, kTwoViewHubers * options.huber_px);
+    if (!view || view->inliers < kMinStartInliers) continue;
+    if (!(view->median_parallax_rad >= options.min_parallax_rad)) continue;
+    const double share = view->inliers / static_cast<double>(shared.tracks.size());
+    const double score =
+        view->inliers * share * std::min(view->median_parallax_rad, kGoodParallaxRad);
+    if (score <= best_score) continue;
+    best_score = score;
+    best = Start{pair.first, pair.second, std::move(*view), std::move(shared)};
   }
   return best;
 }

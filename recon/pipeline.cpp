@@ -45,12 +45,13 @@ void write_depth(const EstimateLayout& layout, const TriangleMesh& map, const St
   for (std::size_t k = 0; k < structure.frames.size(); ++k)
     if (structure.placed[k]) placed.push_back(static_cast<int>(k));
   progress.begin("depth of key frames", placed.size());
+  const std::vector<Vec3> rays = pixel_rays(original_lens);
   for (std::size_t begin = 0; begin < placed.size(); begin += kDepthMapsAtOnce) {
     const std::size_t end = std::min(placed.size(), begin + kDepthMapsAtOnce);
     tbb::parallel_for(begin, end, [&](std::size_t i) {
       const int k = placed[i];
       write_exr(layout.depth(structure.frames[k]),
-                keyframe_depth(map, structure.cam_from_world[k], original_lens));
+                keyframe_depth(map, structure.cam_from_world[k], original_lens, rays));
     });
     progress.step(end - begin);
   }

@@ -64,10 +64,11 @@ Vec3 wall_on_ray(const Vec3& origin, const Vec3& direction) {
     const Vec3 x = origin + t * direction;
     return x.norm() < wall_radius_mm(x.normalized());
   };
-  double low = 0.0, high = 1.0;
+  constexpr double kStepMm = 4.0;  // the folds are wider
+  double low = 0.0, high = kStepMm;
   while (inside(high)) {
     low = high;
-    high += 1.0;
+    high += kStepMm;
   }
   for (int i = 0; i < 20; ++i) {
     const double middle = 0.5 * (low + high);

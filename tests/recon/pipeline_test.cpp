@@ -1,0 +1,118 @@
+// The whole pipeline on plain pictures of a cavity: a folder of images and a calibration file, as a
+// user would have them.
+
+#include "recon/pipeline.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <opencv2/core.hpp>
+
+#include "core/check.h"
+#include "core/files.h"
+#include "dataset/image_io.h"
+#include "synthetic.h"
+
+namespace rugae {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kFrames = 14;
+constexpr double kStepRad = 0.035;  // about 0.8 mm and 2 degrees between frames
+
+class Pipeline : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    root_ = fs::path(testing::TempDir()) / "rugae_pipeline_test";
+    fs::remove_all(root_);
+    std::vector<Rigid3> path;
+    for (int i = 0; i < kFrames; ++i) path.push_back(synthetic::world_from_camera(i * kStepRad));
+    recording_ = synthetic::record(root_ / "recording", synthetic::lens_of(320, 240), path, 1.0);
+  }
+  static void TearDownTestSuite() { fs::remove_all(root_); }
+
+  static Estimate run(const synthetic::Recording& recording, const std::string& name,
+                      ReconOptions options = {}) {
+    options.keyframes.mean_flow_px = 15.0;
+    options.pictures = false;
+    Progress progress(Progress::Output::silent);
+    return reconstruct(Observations::open(recording.images, recording.calibration), options,
+                       root_ / name, progress);
+  }
+
+  static fs::path root_;
+  static synthetic::Recording recording_;
+};
+
+fs::path Pipeline::root_;
+synthetic::Recording Pipeline::recording_;
+
+// Half a degree and 2 % of the path: what 320 x 240 pictures without any tuning must give.
+constexpr double kPathShare = 0.02;
+constexpr double kRotationRad = 0.009;
+
+TEST_F(Pipeline, FindsThePathFromPicturesAndTheBytesDoNotDependOnThreads) {
+  Estimate two;
+  {
+    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 2);
+    cv::setNumThreads(2);
+    ReconOptions options;
+    options.pictures = true;
+    two = run(recording_, "two", options);
+  }
+  std::vector<Rigid3> estimated, truth;
+  for (int i = 0; i < kFrames; ++i) {
+    EXPECT_NE(two.states[i], FrameState::lost) << i;
+    if (two.states[i] == FrameState::lost) continue;
+    estimated.push_back(two.world_from_camera[i]);
+    truth.push_back(recording_.world_from_camera[i]);
+  }
+  const auto error = synthetic::path_error(estimated, truth);
+  EXPECT_TRUE(error.rmse <= kPathShare * error.path_extent) << error.rmse;
+  EXPECT_TRUE(error.worst_rotation_rad <= kRotationRad) << error.worst_rotation_rad;
+  EXPECT_FALSE(two.map.empty());
+
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 1);
+  cv::setNumThreads(1);
+  run(recording_, "one");
+  cv::setNumThreads(-1);
+  for (const char* file : {"trajectory.txt", "frames.csv", "points.ply", "map.ply"})
+    EXPECT_EQ(read_text(root_ / "one" / file), read_text(root_ / "two" / file)) << file;
+}
+
+TEST_F(Pipeline, FramesWithoutTextureAreLostNotErrors) {
+  const fs::path folder = root_ / "blank_between";
+  fs::copy(recording_.images.parent_path(), folder, fs::copy_options::recursive);
+  synthetic::Recording recording = recording_;
+  recording.images = folder / "images";
+  const cv::Mat blank(240, 320, CV_8UC3, cv::Scalar(90, 95, 120));
+  write_image(recording.images / "000005.png", blank);
+  write_image(recording.images / "000010.png", blank);
+  const Estimate e = run(recording, "blank_between_out");
+  EXPECT_EQ(e.states[5], FrameState::lost);
+  EXPECT_EQ(e.states[10], FrameState::lost);
+  int tracked = 0;
+  for (const FrameState state : e.states) tracked += state != FrameState::lost;
+  EXPECT_GE(tracked, kFrames - 4);
+}
+
+TEST_F(Pipeline, NothingUsableIsAnErrorThatSaysSo) {
+  const fs::path folder = root_ / "blank";
+  synthetic::Recording recording{folder / "images", recording_.calibration, {}};
+  make_folder(recording.images);
+  for (int i = 0; i < 3; ++i)
+    write_image(recording.images / (std::to_string(i) + ".png"),
+                cv::Mat(240, 320, CV_8UC3, cv::Scalar(90, 95, 120)));
+  try {
+    run(recording, "blank_out");
+    FAIL() << "expected an Error";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "images: 0 usable frames of 3, expected at least 2: the others show too little "
+                 "texture, light or common wall to be placed");
+  }
+}
+
+}  // namespace
+}  // namespace rugae
