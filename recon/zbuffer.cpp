@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/check.h"
+#include "core/units.h"
 #include "recon/map.h"
 
 namespace rugae {
@@ -18,6 +19,8 @@ namespace {
 /// measures this share of the picture's width.
 constexpr double kCurvedShare = 0.125;
 constexpr double kCurvedEdgeMargin = 0.25;
+/// A ray at a corner of the triangle must not be lost to rounding.
+constexpr double kCosineRounding = 1e-12;
 
 struct Corner {
   Vec3 p_cam;
@@ -39,16 +42,28 @@ double hit(const Vec3& ray, const Vec3& a, const Vec3& ab, const Vec3& ac) {
   return ac.dot(q) / determinant;
 }
 
-/// True when the triangle's bounding sphere lies outside the cone of this half angle about the
-/// axis.
-bool outside_cone(const Vec3& a, const Vec3& b, const Vec3& c, double half_angle_rad) {
-  const Vec3 centre = (a + b + c) / 3.0;
+/// The directions in which a triangle may be seen: those within an angle of the centre of the
+/// sphere around it; all of them when the eye is inside that sphere.
+struct Directions {
+  Vec3 centre = Vec3::UnitZ();
+  double half_angle_rad = kPi;
+};
+
+Directions directions_of(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 middle = (a + b + c) / 3.0;
   const double radius = std::sqrt(std::max(
-      {(a - centre).squaredNorm(), (b - centre).squaredNorm(), (c - centre).squaredNorm()}));
-  const double distance = centre.norm();
-  if (!(distance > radius)) return false;
-  return std::acos(std::clamp(centre.z() / distance, -1.0, 1.0)) - std::asin(radius / distance) >
-         half_angle_rad;
+      {(a - middle).squaredNorm(), (b - middle).squaredNorm(), (c - middle).squaredNorm()}));
+  const double distance = middle.norm();
+  if (!(distance > radius)) return {};
+  return {middle / distance, std::asin(radius / distance)};
+}
+
+/// Largest angle of a ray from the axis.
+double widest_angle_rad(const std::vector<Vec3>& rays) {
+  double smallest_z = 1.0;
+  for (const Vec3& ray : rays)
+    if (ray.z() > 0.0) smallest_z = std::min(smallest_z, ray.z());
+  return std::acos(smallest_z);
 }
 
 }  // namespace
@@ -75,7 +90,7 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world, co
   const LensProjector projector(lens);
   cv::Mat depth(lens.height, lens.width, CV_32F,
                 cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
-  const double lens_angle_rad = lens.max_angle_rad();
+  const double picture_angle_rad = widest_angle_rad(rays);
   std::vector<Corner> corners;
   corners.reserve(map.vertices.size());
   for (const Vec3& vertex : map.vertices) {
@@ -89,13 +104,20 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world, co
     int projected = 0;
     for (const Corner* corner : c)
       if (corner->pixel) box.extend(*corner->pixel), ++projected;
-    if (projected == 0 && outside_cone(c[0]->p_cam, c[1]->p_cam, c[2]->p_cam, lens_angle_rad))
-      continue;
-    // A triangle that reaches out of what the lens sees may cover anything.
-    if (projected < 3) box = {Vec2(0, 0), Vec2(lens.width, lens.height)};
-    const double size_px = box.sizes().maxCoeff();
-    const double curved = std::min(1.0, size_px / (kCurvedShare * lens.width));
-    const double margin = 1.0 + kCurvedEdgeMargin * curved * size_px;
+    double margin = 1.0;
+    Directions seen;
+    if (projected == 3) {
+      const double size_px = box.sizes().maxCoeff();
+      const double curved = std::min(1.0, size_px / (kCurvedShare * lens.width));
+      margin += kCurvedEdgeMargin * curved * size_px;
+    } else {
+      // Part of the triangle lies beyond what the lens sees: it may cover anything within its cone.
+      seen = directions_of(c[0]->p_cam, c[1]->p_cam, c[2]->p_cam);
+      const double off_axis_rad = std::acos(std::clamp(seen.centre.z(), -1.0, 1.0));
+      if (off_axis_rad - seen.half_angle_rad > picture_angle_rad) continue;
+      box = {Vec2(0, 0), Vec2(lens.width, lens.height)};
+    }
+    const double seen_cosine = std::cos(seen.half_angle_rad) - kCosineRounding;
     const int left = std::max(0, static_cast<int>(std::floor(box.min().x() - margin)));
     const int top = std::max(0, static_cast<int>(std::floor(box.min().y() - margin)));
     const int right = std::min(lens.width - 1.0, std::ceil(box.max().x() + margin));
@@ -105,7 +127,7 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world, co
     for (int y = top; y <= bottom; ++y)
       for (int x = left; x <= right; ++x) {
         const Vec3& ray = rays[static_cast<std::size_t>(y) * lens.width + x];
-        if (!(ray.z() > 0.0)) continue;
+        if (!(ray.z() > 0.0) || ray.dot(seen.centre) < seen_cosine) continue;
         const double z = hit(ray, c[0]->p_cam, ab, ac) * ray.z();
         float& nearest = depth.at<float>(y, x);
         if (z > 0.0 && !(nearest <= z)) nearest = static_cast<float>(z);
