@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "core/check.h"
+#include "scenes/cell_sheets.h"
 
 namespace rugae {
 namespace {
@@ -15,18 +16,23 @@ namespace {
 constexpr int kBlock = 4;  // cells along a block's edge
 constexpr int kCorners = kBlock + 1;
 
-struct CellVertex {
-  std::int64_t cell;
-  Vec3 position;
+// A cell that the surface passes through. A simple one is cut by one sheet, whose vertex is the
+// mean of the cuts; the others keep their cuts until their sheets are known.
+struct CutCell {
+  std::int64_t key;
+  CornerMask inside;
+  Vec3 vertex;    // of a simple cell
+  int cuts = -1;  // index into BlockSurface::cuts of another
 };
+using Cuts = std::array<Vec3, 12>;
 struct GridEdge {
   std::int64_t cell;  // the edge starts at the cell's lowest corner
   int axis;
   bool leaves;  // from inside to outside along the axis
 };
 struct BlockSurface {
-  bool ambiguous = false;
-  std::vector<CellVertex> vertices;
+  std::vector<CutCell> cells;
+  std::vector<Cuts> cuts;
   std::vector<GridEdge> edges;
 };
 
@@ -45,24 +51,6 @@ struct Grid {
   }
   Vec3 corner(int x, int y, int z) const { return origin + cell_mm * Vec3(x, y, z); }
 };
-
-// A face whose diagonals have unlike signs is cut twice, and two corners alone at a diagonal's ends
-// are two sheets: one vertex for the cell would join what is apart. Corner bits: x, y, z.
-bool is_ambiguous(const bool inside[8]) {
-  for (int axis = 0; axis < 3; ++axis)
-    for (int side = 0; side < 2; ++side) {
-      const int u = 1 << (axis + 1) % 3, w = 1 << (axis + 2) % 3, base = side << axis;
-      if (inside[base] == inside[base | u | w] && inside[base | u] == inside[base | w] &&
-          inside[base] != inside[base | u])
-        return true;
-    }
-  int count = 0;
-  for (int c = 0; c < 8; ++c) count += inside[c];
-  if (count != 2 && count != 6) return false;
-  for (int c = 0; c < 4; ++c)
-    if (inside[c] == (count == 2) && inside[7 - c] == (count == 2)) return true;
-  return false;
-}
 
 BlockSurface surface_in_block(const DistanceField& field, const Grid& grid, const Vec3i& first) {
   BlockSurface out;
@@ -84,13 +72,13 @@ BlockSurface surface_in_block(const DistanceField& field, const Grid& grid, cons
     for (int y = 0; y < kBlock; ++y)
       for (int x = 0; x < kBlock; ++x) {
         const std::int64_t cell = grid.key(first.x() + x, first.y() + y, first.z() + z);
-        bool inside[8];
+        CornerMask inside = 0;
         for (int c = 0; c < 8; ++c)
-          inside[c] = at(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)) < 0.0;
-        out.ambiguous |= is_ambiguous(inside);
-        // the vertex: the mean of the level's crossings with the cell's twelve edges
+          if (at(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)) < 0.0) inside |= 1 << c;
+        if (inside == 0 || inside == 255) continue;
+        Cuts cuts;
         Vec3 sum = Vec3::Zero();
-        int crossings = 0;
+        int count = 0;
         for (int axis = 0; axis < 3; ++axis)
           for (int side = 0; side < 4; ++side) {
             Vec3i a(x, y, z);
@@ -103,11 +91,16 @@ BlockSurface surface_in_block(const DistanceField& field, const Grid& grid, cons
             if (side == 0) out.edges.push_back({cell, axis, va < 0.0});
             Vec3 p = (first + a).cast<double>();
             p[axis] += va / (va - vb);
-            sum += p;
-            ++crossings;
+            cuts[4 * axis + side] = grid.origin + grid.cell_mm * p;
+            sum += cuts[4 * axis + side];
+            ++count;
           }
-        if (crossings)
-          out.vertices.push_back({cell, grid.origin + grid.cell_mm * (sum / crossings)});
+        CutCell cut{cell, inside, sum / count, -1};
+        if (ambiguous_faces(inside) || cell_sheets(inside, 0).count > 1) {
+          cut.cuts = static_cast<int>(out.cuts.size());
+          out.cuts.push_back(cuts);
+        }
+        out.cells.push_back(cut);
       }
   return out;
 }
@@ -147,61 +140,118 @@ void relax(TriangleMesh& mesh, const std::vector<std::array<int, 4>>& quads,
   }
 }
 
+// The vertices, and which of them an edge of a cell leads to.
+class SheetVertices {
+ public:
+  SheetVertices(const std::vector<BlockSurface>& surfaces, const Grid& grid,
+                std::vector<Vec3>& vertices) {
+    std::size_t total = 0;
+    for (const auto& s : surfaces) total += s.cells.size();
+    first_.reserve(total);
+    vertices.reserve(total);
+    std::unordered_map<std::int64_t, Complex> complex;
+    for (const auto& s : surfaces)
+      for (const CutCell& c : s.cells)
+        if (c.cuts >= 0) complex.emplace(c.key, Complex{c.inside, 0, cell_sheets(c.inside, 0)});
+    invert_pinched_faces(complex, surfaces, grid);
+    for (const auto& s : surfaces)
+      for (const CutCell& c : s.cells) {
+        const int base = static_cast<int>(vertices.size());
+        first_.emplace(c.key, c.cuts < 0 ? base : ~base);
+        if (c.cuts < 0) {
+          vertices.push_back(c.vertex);
+          continue;
+        }
+        Complex& cell = complex.at(c.key);
+        for (int sheet = 0; sheet < cell.sheets.count; ++sheet) {
+          Vec3 sum = Vec3::Zero();
+          int count = 0;
+          for (int e = 0; e < 12; ++e)
+            if (cell.sheets.of_edge[e] == sheet) {
+              sum += s.cuts[c.cuts][e];
+              ++count;
+            }
+          vertices.push_back(sum / count);
+        }
+      }
+    complex_ = std::move(complex);
+  }
+
+  /// -1 when the cell is not cut.
+  int operator()(std::int64_t cell, int edge) const {
+    const auto base = first_.find(cell);
+    if (base == first_.end()) return -1;
+    if (base->second >= 0) return base->second;
+    return ~base->second + complex_.at(cell).sheets.of_edge[edge];
+  }
+
+ private:
+  struct Complex {
+    CornerMask inside;
+    FaceMask inverted;
+    CellSheets sheets;
+  };
+
+  static void invert_pinched_faces(std::unordered_map<std::int64_t, Complex>& complex,
+                                   const std::vector<BlockSurface>& surfaces, const Grid& grid) {
+    for (const auto& s : surfaces)
+      for (const CutCell& c : s.cells) {
+        if (c.cuts < 0) continue;
+        const FaceMask faces = ambiguous_faces(c.inside);
+        for (int axis = 0; axis < 3; ++axis) {
+          if (!(faces >> (2 * axis + 1) & 1)) continue;
+          const auto other = complex.find(c.key + grid.stride(axis));
+          if (other == complex.end()) continue;
+          Complex &low = complex.at(c.key), &high = other->second;
+          if (!is_pinched(low.sheets, axis, 1) || !is_pinched(high.sheets, axis, 0)) continue;
+          low.inverted |= 1 << (2 * axis + 1);
+          high.inverted |= 1 << (2 * axis);
+          low.sheets = cell_sheets(low.inside, low.inverted);
+          high.sheets = cell_sheets(high.inside, high.inverted);
+        }
+      }
+  }
+
+  std::unordered_map<std::int64_t, int>
+      first_;  // the cell's first vertex; its complement if complex
+  std::unordered_map<std::int64_t, Complex> complex_;
+};
+
 }  // namespace
 
 TriangleMesh isosurface(const DistanceField& field, const Eigen::AlignedBox3d& box, double cell_mm,
                         int rounds, const std::string& name) {
   Grid grid{box.min() - Vec3::Constant(cell_mm), cell_mm, {}};
-  for (int a = 0; a < 3; ++a)  // a cell more on both sides, and one for the shifts
+  for (int a = 0; a < 3; ++a)
     grid.blocks[a] =
-        static_cast<int>(std::ceil((box.sizes()[a] + 3.0 * cell_mm) / (kBlock * cell_mm)));
+        static_cast<int>(std::ceil((box.sizes()[a] + 2.0 * cell_mm) / (kBlock * cell_mm)));
   const std::size_t count =
       static_cast<std::size_t>(grid.blocks.x()) * grid.blocks.y() * grid.blocks.z();
   check(count < (std::size_t{1} << 27), "{}: {} mm is too fine for a wall of {:.0f} mm", name,
         cell_mm, box.sizes().maxCoeff());
   std::vector<BlockSurface> surfaces(count);
-  constexpr int kShifts = 12;
-  const Vec3 unshifted = grid.origin;
-  for (int shift = 0;; ++shift) {
-    check(shift < kShifts, "{}: parts of the wall lie closer than {:.1f} mm", name, 2.0 * cell_mm);
-    const auto part = [&](double step) { return shift * step - std::floor(shift * step); };
-    // multiples of the golden ratio and its like fill the cell evenly
-    grid.origin = unshifted - cell_mm * Vec3(part(0.819), part(0.671), part(0.549));
-    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-      const int nx = grid.blocks.x(), ny = grid.blocks.y();
-      const Vec3i block(static_cast<int>(i % nx), static_cast<int>(i / nx % ny),
-                        static_cast<int>(i / nx / ny));
-      surfaces[i] = surface_in_block(field, grid, kBlock * block);
-    });
-    if (std::none_of(surfaces.begin(), surfaces.end(),
-                     [](const BlockSurface& s) { return s.ambiguous; }))
-      break;
-  }
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    const int nx = grid.blocks.x(), ny = grid.blocks.y();
+    const Vec3i block(static_cast<int>(i % nx), static_cast<int>(i / nx % ny),
+                      static_cast<int>(i / nx / ny));
+    surfaces[i] = surface_in_block(field, grid, kBlock * block);
+  });
 
   TriangleMesh mesh;
-  std::unordered_map<std::int64_t, int> vertex_of_cell;
-  std::size_t total = 0;
-  for (const auto& s : surfaces) total += s.vertices.size();
-  vertex_of_cell.reserve(total);
-  mesh.vertices.reserve(total);
-  for (const auto& s : surfaces)
-    for (const CellVertex& v : s.vertices) {
-      vertex_of_cell.emplace(v.cell, static_cast<int>(mesh.vertices.size()));
-      mesh.vertices.push_back(v.position);
-    }
+  const SheetVertices vertex_at(surfaces, grid, mesh.vertices);
   std::vector<std::array<int, 4>> quads;
-  quads.reserve(total);
+  quads.reserve(mesh.vertices.size());
   for (const auto& s : surfaces)
     for (const GridEdge& e : s.edges) {
       const std::int64_t u = grid.stride((e.axis + 1) % 3), w = grid.stride((e.axis + 2) % 3);
       // the four cells around the edge, turning from u to w: the normal is along the axis
-      std::array<std::int64_t, 4> cells{e.cell, e.cell - u, e.cell - u - w, e.cell - w};
-      std::array<int, 4> quad;
-      for (int k = 0; k < 4; ++k) {
-        const auto found = vertex_of_cell.find(cells[k]);
-        check(found != vertex_of_cell.end(), "{}: the wall reaches the border of its box", name);
-        quad[k] = found->second;
-      }
+      const int edge = 4 * e.axis;
+      std::array<int, 4> quad{vertex_at(e.cell, edge), vertex_at(e.cell - u, edge + 1),
+                              vertex_at(e.cell - u - w, edge + 3), vertex_at(e.cell - w, edge + 2)};
+      check(*std::min_element(quad.begin(), quad.end()) >= 0,
+            "{}: inside and outside cannot be told apart: the wall crosses itself or has edges of "
+            "three triangles",
+            name);
       if (!e.leaves) std::swap(quad[1], quad[3]);
       quads.push_back(quad);
     }

@@ -13,11 +13,11 @@ using DistanceField = std::function<double(const Vec3& p, Vec3* gradient)>;
 inline constexpr double kSteepestField = 1.1;
 
 /// The zero level of the field inside `box`, by surface nets (Gibson, Constrained elastic surface
-/// nets, MICCAI 1998) on a grid of `cell_mm`, then `rounds` of tangential relaxation, each followed
-/// by a Newton step back onto the level. Vertices lie on the level; normals point to where the
-/// field is positive. Closed and manifold: a grid that cuts the surface ambiguously (a vertex would
-/// join two sheets) is shifted and tried again; throws Error naming `name` when no shift helps, as
-/// where sheets lie closer than a cell. About 3 A / cell^2 triangles for an area A.
+/// nets, MICCAI 1998) on a grid of `cell_mm` with a vertex a sheet (cell_sheets.h), then `rounds`
+/// of tangential relaxation, each followed by a Newton step back onto the level. Closed and
+/// manifold; vertices lie on the level; normals point to where the field is positive. Throws Error
+/// naming `name` when there is no such level, or a box of too many cells. About 3 A / cell^2
+/// triangles for an area A.
 TriangleMesh isosurface(const DistanceField& field, const Eigen::AlignedBox3d& box, double cell_mm,
                         int rounds, const std::string& name);
 
