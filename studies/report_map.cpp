@@ -69,13 +69,36 @@ TriangleMesh facing_as(TriangleMesh map, const TriangleMesh& wall) {
   return map;
 }
 
-std::string picture(const TriangleMesh& mesh, const Eigen::AlignedBox3d& box, const Side& side,
-                    const std::string& alt, const std::string& caption) {
+cv::Mat view_into(const TriangleMesh& mesh, const Eigen::AlignedBox3d& box, const Side& side,
+                  float background) {
   const Lens lens = picture_lens(kWidth_px, kHeight_px);
   ShadedViewOptions options;
   options.cull_front = true;  // the near side is left out: the eye looks into the organ
-  const cv::Mat image =
-      shaded_view(mesh, view_of_box(box, side.from, side.up, lens), lens, options);
+  options.background_srgb = Vec3f::Constant(background);
+  return shaded_view(mesh, view_of_box(box, side.from, side.up, lens), lens, options);
+}
+
+// The map over a pale wall. What lies before what does not matter: the map is always shown. Its
+// share a of a pixel follows from two backgrounds: a m + (1 - a) b on white less the same on black
+// is (1 - a) white.
+cv::Mat map_over_wall(const TriangleMesh& map, const cv::Mat& wall, const Eigen::AlignedBox3d& box,
+                      const Side& side) {
+  const cv::Mat on_white = view_into(map, box, side, 1.0f), on_black = view_into(map, box, side, 0);
+  constexpr double kPale = 0.72;
+  cv::Mat picture(wall.size(), CV_8UC3);
+  for (int y = 0; y < wall.rows; ++y)
+    for (int x = 0; x < wall.cols; ++x)
+      for (int c = 0; c < 3; ++c) {
+        const double dark = on_black.at<cv::Vec3b>(y, x)[c];
+        const double open = (on_white.at<cv::Vec3b>(y, x)[c] - dark) / 255.0;
+        const double pale = 255.0 * kPale + (1.0 - kPale) * wall.at<cv::Vec3b>(y, x)[c];
+        picture.at<cv::Vec3b>(y, x)[c] = cv::saturate_cast<unsigned char>(dark + open * pale);
+      }
+  return picture;
+}
+
+std::string figure(const cv::Mat& image, const Side& side, const std::string& alt,
+                   const std::string& caption) {
   return html::figure(html::jpeg(image, kWidth_px, 88), alt + ", " + side.name, caption);
 }
 
@@ -107,16 +130,19 @@ std::string map_part(const CellView& view) {
     errors = coloured_by_error(map, error_mm, worst_mm);
   }
   out += fmt::format("<div class=\"maps\" style=\"--columns:{}\">", has_map ? 3 : 1);
+  TriangleMesh clay = wall;
+  clay.colors.clear();
   for (const Side& side : two_sides()) {
-    out += picture(wall, box, side, "true wall",
-                   fmt::format("The true wall, {}, looking in through the near side. Rose: seen by "
-                               "the capsule; gray: never seen.",
-                               side.name));
+    out += figure(view_into(wall, box, side, 1.0f), side, "true wall",
+                  "The true wall, " + side.name +
+                      ", looking in through the near side. Rose: seen by the capsule; gray: never "
+                      "seen.");
     if (!has_map) continue;
-    out += picture(map, box, side, "reconstructed map",
-                   "The reconstructed map in its own colours, same view and scale.");
-    out += picture(errors, box, side, "map coloured by error",
-                   "The map coloured by its distance to the wall that was seen.");
+    const cv::Mat shape = view_into(clay, box, side, 1.0f);
+    out += figure(map_over_wall(map, shape, box, side), side, "reconstructed map",
+                  "The reconstructed map in its own colours, over the true wall (pale).");
+    out += figure(map_over_wall(errors, shape, box, side), side, "map coloured by error",
+                  "The map coloured by its distance to the wall that was seen.");
   }
   out += "</div>\n";
   if (!has_map) return out;

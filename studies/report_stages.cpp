@@ -87,7 +87,7 @@ std::string slider(const fs::path& before, const fs::path& after) {
       html::jpeg(read_image_bgr(before)), html::jpeg(read_image_bgr(after)));
 }
 
-// "000012" -> "frame 12", "000012-000018" -> "frames 12 and 18", "003" -> "3".
+// "000012" -> "frame 12", "000012-000018" -> "frames 12 and 18", "003" -> "no. 3".
 std::string readable(const std::string& name) {
   const auto number = [](const std::string& digits) {
     const auto first = digits.find_first_not_of('0');
@@ -97,7 +97,7 @@ std::string readable(const std::string& name) {
     return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
   };
   constexpr std::size_t kFrameDigits = 6;
-  if (is_number(name)) return (name.size() == kFrameDigits ? "frame " : "") + number(name);
+  if (is_number(name)) return (name.size() == kFrameDigits ? "frame " : "no. ") + number(name);
   const auto dash = name.find('-');
   if (dash == kFrameDigits && is_number(name.substr(0, dash)) && is_number(name.substr(dash + 1)))
     return "frames " + number(name.substr(0, dash)) + " and " + number(name.substr(dash + 1));

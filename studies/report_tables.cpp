@@ -145,8 +145,12 @@ std::string counts_table(const json& metrics) {
   html::Table table;
   table.head = {"", ""};
   for (const auto& [name, value] : metrics.at("reconstruction").items())
-    if (value.is_number())
-      table.rows.push_back({html::escape(name), html::number(value.get<double>(), 4)});
+    if (value.is_number()) {
+      const double number = value;
+      const bool whole = number == std::floor(number);
+      table.rows.push_back(
+          {html::escape(name), whole ? fmt::format("{:.0f}", number) : html::number(number, 4)});
+    }
   return table.str();
 }
 
@@ -160,23 +164,38 @@ std::string headline_cards(const CellView& view) {
   const double map = value_at(metrics, "surface.icp_aligned.accuracy_mean_mm");
   const double speed = value_at(metrics, "time.frames_per_s");
   const double seen = value_at(metrics, "coverage.seen_share");
+  const int tracked = metrics.at("tracking").at("tracked");
+  const int frames = metrics.at("tracking").at("frames");
   std::string out = "<div class=\"cards\">\n";
+  // An error over a part of the path or wall is not one over the whole: say which.
+  const std::string where =
+      tracked < frames ? fmt::format("over {} of {} frames<br>", tracked, frames) : std::string();
   out += card("Path error, RMSE", html::number(ate), "mm",
-              against_paper(ate, paper.ate_rmse_mm, "mm"));
-  out +=
-      card("Map error, mean", html::number(map), "mm", against_paper(map, paper.map_mean_mm, "mm"));
-  out += card("Frames tracked", fmt::format("{}", metrics.at("tracking").at("tracked").get<int>()),
-              fmt::format("of {}", metrics.at("tracking").at("frames").get<int>()),
+              where + against_paper(ate, paper.ate_rmse_mm, "mm"));
+  const json& surface = metric_at(metrics, "surface.icp_aligned");
+  const double covered = surface.is_object() ? surface.value("recall_at_5mm", 0.0) : std::nan("");
+  out += card("Map error, mean", html::number(map), "mm",
+              fmt::format("covers {} % of the seen wall within 5 mm<br>",
+                          html::number(kPercent * covered)) +
+                  against_paper(map, paper.map_mean_mm, "mm"));
+  out += card("Frames tracked", fmt::format("{}", tracked), fmt::format("of {}", frames),
               html::number(value_at(metrics, "tracking.keyframes"), 1) + " key frames");
-  out += card("Reconstructed", html::number(speed), "frames/s",
+  out += card("Reconstructed", html::number(speed, 2), "frames/s",
               against_paper(speed, 1.0 / paper.seconds_per_frame_pair, "pairs/s", true));
-  out += card("Simulated", html::number(value_at(metrics, "simulation.frames_per_s")), "frames/s",
-              "with all labels");
+  out += card("Simulated", html::number(value_at(metrics, "simulation.frames_per_s"), 2),
+              "frames/s", "with all labels");
   out += card("Wall seen", html::number(kPercent * seen), "%",
               fmt::format("{} of {} cm&sup2;",
                           html::number(value_at(metrics, "coverage.seen_area_mm2") / 100.0),
                           html::number(value_at(metrics, "coverage.wall_area_mm2") / 100.0)));
-  return out + "</div>\n";
+  out += "</div>\n";
+  if (2 * tracked < frames)
+    out += fmt::format(
+        "<p class=\"note\">Only {} of {} frames could be placed. Errors below are over those "
+        "alone, "
+        "and say nothing about the rest of the path.</p>\n",
+        tracked, frames);
+  return out;
 }
 
 std::string tables_part(const CellView& view) {
