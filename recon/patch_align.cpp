@@ -11,7 +11,8 @@
 namespace rugae {
 namespace {
 
-constexpr double kNegligiblePx = 0.01;  // a step that moves no corner further is the end
+constexpr double kNegligiblePx = 0.01;    // a step that moves no corner further is the end
+constexpr double kNegligibleGain = 1e-3;  // nor one that lowers the error by a smaller share
 constexpr int kCoarsestWidthPx = 80;
 constexpr int kHalvings = 4;
 constexpr double kMinOverlapPx = 100.0;
@@ -161,7 +162,7 @@ void descend(const PatchPair& pair, double px_per_px, double stop_mse, int max_i
     const Eigen::LDLT<Mat6> solver(cost.normal_matrix);
     if (!(solver.vectorD().minCoeff() > kMinTexture * cost.overlap_px)) return;
     Vec6 step = solver.solve(-cost.gradient);
-    bool lowered = false;
+    bool lowered = false, settled = false;
     for (int halving = 0; halving <= kHalvings && !lowered; ++halving, step *= 0.5) {
       const Affine2 next = moved(fit.ref_from_mov, step, norm);
       const double motion_px =
@@ -170,10 +171,12 @@ void descend(const PatchPair& pair, double px_per_px, double stop_mse, int max_i
       const PatchCost trial = cost_at(pair, reference, next);
       lowered = trial.overlap_px >= kMinOverlapPx && trial.mse() < cost.mse();
       if (!lowered) continue;
+      settled = trial.mse() > (1.0 - kNegligibleGain) * cost.mse();
       fit.ref_from_mov = next;
       cost = trial;
     }
-    if (!lowered) {
+    if (!lowered || settled) {
+      fit.mse = cost.mse();
       fit.converged = true;
       return;
     }

@@ -54,8 +54,9 @@ struct AffineFitOptions {
 };
 
 /// Minimises e(A) from a start, coarse to fine over a pyramid; ends when the MSE at full resolution
-/// is below `stop_mse`, when a step moves no image corner by 0.01 px, or when no part of the
-/// Gauss-Newton step lowers the cost (all `converged`), or after `max_iterations`.
+/// is below `stop_mse`, when a step moves no image corner by 0.01 px or lowers the MSE by less than
+/// 0.1 %, or when no part of the Gauss-Newton step lowers it (all `converged`), or after
+/// `max_iterations`.
 AffineFit fit_affine(const PatchPair& pair, const Affine2& start, const AffineFitOptions& options);
 
 }  // namespace rugae
