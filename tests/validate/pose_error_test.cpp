@@ -142,6 +142,19 @@ TEST(PoseError, TurningDriftGivesTheExactAngle) {
   EXPECT_NEAR(error.rotation_rad.rmse, 0.01, kRounding_rad);
 }
 
+// One step that moves and turns: |Q^-1 P| has the translation |t_p - t_q| whatever the rotations,
+// which P Q^-1 has not; and no place or orientation of the first pose changes that.
+TEST(PoseError, AStepThatTurnsAndMovesGivesBothErrorsExactly) {
+  const auto turn_z = [](double rad) { return Quat(Eigen::AngleAxisd(rad, Vec3::UnitZ())); };
+  const Rigid3 start{Quat(Eigen::AngleAxisd(1.0, Vec3(1, 1, 0).normalized())), Vec3(30, -20, 10)};
+  const std::vector<Rigid3> truth{start, start * Rigid3(turn_z(0.3), Vec3(5, 0, 0))};
+  const std::vector<std::optional<Rigid3>> estimate{start,
+                                                    start * Rigid3(turn_z(0.5), Vec3(5, 0.2, 0))};
+  const RelativeError error = relative_error(truth, estimate, 1.0, {1, -1});
+  EXPECT_NEAR(error.translation_mm.rmse, 0.2, kRounding_mm);
+  EXPECT_NEAR(error.rotation_rad.rmse, 0.2, kRounding_rad);
+}
+
 TEST(PoseError, ALostFrameIsCountedAndBreaksItsSteps) {
   const PoseTrack truth = curl(20);
   PoseTrack estimate = truth;
