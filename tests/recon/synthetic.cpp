@@ -197,9 +197,10 @@ PathError path_error(const std::vector<Rigid3>& estimated, const std::vector<Rig
   error.path_extent = box.diagonal().norm();
   for (std::size_t i = 0; i < truth.size(); ++i) {
     error.rmse += (*aligned * source[i] - target[i]).squaredNorm();
+    const Quat estimated_turn = estimated[0].rotation.conjugate() * estimated[i].rotation;
+    const Quat true_turn = truth[0].rotation.conjugate() * truth[i].rotation;
     error.worst_rotation_rad =
-        std::max(error.worst_rotation_rad,
-                 angle_between_rad((*aligned * estimated[i]).rotation, truth[i].rotation));
+        std::max(error.worst_rotation_rad, angle_between_rad(estimated_turn, true_turn));
   }
   error.rmse = std::sqrt(error.rmse / static_cast<double>(truth.size()));
   return error;

@@ -55,7 +55,8 @@ Recording record(const std::filesystem::path& folder, const Lens& lens,
                  const std::vector<Rigid3>& world_from_camera, double noise_levels = 0.0);
 
 /// Root mean square distance of estimated camera centres to the true ones after the best Sim(3),
-/// and the largest rotation error after it; both over placed cameras only.
+/// and the largest error of the turn from the first camera to another (a short path fixes the whole
+/// rotation badly); over placed cameras only.
 struct PathError {
   double rmse = 0.0, worst_rotation_rad = 0.0,
          path_extent = 0.0;  // rmse and extent in the truth's unit
