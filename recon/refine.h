@@ -12,7 +12,7 @@ namespace rugae {
 struct PointRefinementOptions {
   double radius_px = 7.0;
   int max_iterations = 12;
-  double max_motion_px = 2.0;      // further from the start: another minimum
+  double max_motion_px = 4.0;      // further from the start: another minimum
   double min_correlation = 0.7;    // normalised cross-correlation of the patches at the end
   double max_deviation_px = 0.25;  // predicted standard deviation of the worse direction
 };
