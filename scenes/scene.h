@@ -39,10 +39,10 @@ struct MucosaSample {
 };
 
 struct MucosaOptions {
-  Vec3 base_albedo{0.62, 0.21, 0.115};  // linear RGB; replaced by the preset
-  double vessel_contrast = 0.3;         // 0 to 1: how dark vessels are
-  double mottle_contrast = 0.26;        // 0 to 1: blotches, areae and foveolae
-  double wetness = 0.6;                 // 0 to 1: share of the wall under the wet layer
+  Vec3 base_albedo{0.62, 0.21, 0.1};  // linear RGB; replaced by the preset
+  double vessel_contrast = 0.3;       // 0 to 1: how dark vessels are
+  double mottle_contrast = 0.22;      // 0 to 1: blotches, areae and foveolae
+  double wetness = 0.6;               // 0 to 1: share of the wall under the wet layer
   double oil = 0.0;  // 0 to 1: coverage and smoothness of an oil film (trajectory 6)
   void check(const std::string& where) const;
 };

@@ -208,7 +208,7 @@ TEST(MucosaOptions, NameTheBadField) {
   options = {};
   options.base_albedo.y() = 1.0;
   EXPECT_EQ(message(options),
-            "stomach.yaml: mucosa: base_albedo is [0.62, 1, 0.115], expected values between 0 and "
+            "stomach.yaml: mucosa: base_albedo is [0.62, 1, 0.1], expected values between 0 and "
             "1");
 }
 
