@@ -117,17 +117,24 @@ std::optional<BoardView> find_board(const cv::Mat& gray, int columns, int rows) 
 }
 
 std::optional<std::pair<int, int>> find_board_size(const cv::Mat& gray) {
+  std::pair<int, int> largest(0, 0);
   for (const Attempt& attempt : kAttempts) {
     const cv::Mat image = prepare(gray, attempt.look, zoom_of(attempt, gray));
-    std::vector<cv::Point2f> corners;
-    cv::Mat meta;
-    const bool found = cv::findChessboardCornersSB(
-        image, {kSmallestBoard, kSmallestBoard}, corners,
-        cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER | cv::CALIB_CB_EXHAUSTIVE, meta);
-    if (found && meta.cols >= kSmallestBoard && meta.rows >= kSmallestBoard)
-      return std::make_pair(std::max(meta.cols, meta.rows), std::min(meta.cols, meta.rows));
+    // A seed of 3 x 3 corners may grow along one axis alone: the larger seed is tried as well.
+    for (const int seed : {kSmallestBoard + 1, kSmallestBoard}) {
+      std::vector<cv::Point2f> corners;
+      cv::Mat meta;
+      if (!cv::findChessboardCornersSB(image, {seed, seed}, corners,
+                                       cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER, meta))
+        continue;
+      const std::pair<int, int> size(std::max(meta.cols, meta.rows),
+                                     std::min(meta.cols, meta.rows));
+      if (size.first * size.second > largest.first * largest.second) largest = size;
+    }
+    if (attempt.width_px < 640 && largest.second >= kSmallestBoard) break;
   }
-  return std::nullopt;
+  if (largest.second < kSmallestBoard) return std::nullopt;
+  return largest;
 }
 
 }  // namespace rugae
