@@ -6,7 +6,8 @@
 namespace rugae {
 namespace {
 
-constexpr float kNowherePx = -1e4F;  // far outside every image
+constexpr float kNowherePx = -1e4F;   // far outside every image
+constexpr double kRoundingPx = 1e-6;  // a lens' inverse comes back to within this
 
 }  // namespace
 
@@ -21,8 +22,9 @@ Undistortion::Undistortion(const Lens& from, const Lens& to)
       const std::optional<Vec2> pixel = from.project(*ray);
       if (!pixel) continue;
       row[x] = {static_cast<float>(pixel->x() - 0.5), static_cast<float>(pixel->y() - 0.5)};
-      const bool inside = pixel->x() >= 0.5 && pixel->x() <= from.width - 0.5 &&
-                          pixel->y() >= 0.5 && pixel->y() <= from.height - 0.5;
+      const double low = 0.5 - kRoundingPx, right = from.width - low, bottom = from.height - low;
+      const bool inside =
+          pixel->x() >= low && pixel->x() <= right && pixel->y() >= low && pixel->y() <= bottom;
       if (inside) valid_.at<unsigned char>(y, x) = 255;
     }
   }

@@ -1,0 +1,211 @@
+#include "recon/features.h"
+
+#include <algorithm>
+#include <ctime>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/objdetect.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "core/check.h"
+#include "core/random.h"
+#include "recon/flow.h"
+#include "recon/surf.h"
+
+namespace rugae {
+namespace {
+
+constexpr float kRatio = 0.8F;  // Lowe's, IJCV 2004
+constexpr int kMaxPoints = 2000;
+constexpr int kHogSidePx = 32;
+constexpr std::size_t kMinMatches = 4;  // fix a homography
+
+struct Described {
+  std::vector<cv::Point2f> points;  // integer centres
+  cv::Mat descriptors;              // a row each
+};
+
+std::vector<cv::Point2f> corners(const cv::Mat& image) {
+  std::vector<cv::Point2f> points;
+  cv::goodFeaturesToTrack(image, points, kMaxPoints, 0.005, 7.0);
+  return points;
+}
+
+Described describe(const cv::Ptr<cv::Feature2D>& feature, const cv::Mat& image) {
+  Described d;
+  std::vector<cv::KeyPoint> keypoints;
+  feature->detectAndCompute(image, cv::noArray(), keypoints, d.descriptors);
+  cv::KeyPoint::convert(keypoints, d.points);
+  return d;
+}
+
+// Histograms of oriented gradients (Dalal and Triggs, CVPR 2005, doi:10.1109/CVPR.2005.177) of the
+// window around each corner.
+Described describe_hog(const cv::Mat& image) {
+  const cv::HOGDescriptor hog({kHogSidePx, kHogSidePx}, {16, 16}, {8, 8}, {8, 8}, 9);
+  Described d;
+  const float half = 0.5F * kHogSidePx;
+  std::vector<cv::Point> corner_of_window;
+  for (const cv::Point2f& p : corners(image)) {
+    const cv::Point at(cvRound(p.x - half), cvRound(p.y - half));
+    if (at.x < 0 || at.y < 0 || at.x + kHogSidePx > image.cols || at.y + kHogSidePx > image.rows)
+      continue;
+    corner_of_window.push_back(at);
+    d.points.push_back(p);
+  }
+  if (d.points.empty()) return d;
+  std::vector<float> values;
+  hog.compute(image, values, {8, 8}, {}, corner_of_window);
+  d.descriptors = cv::Mat(values, true).reshape(1, static_cast<int>(d.points.size()));
+  return d;
+}
+
+Described describe_surf(const cv::Mat& image) {
+  Described d;
+  for (const SurfPoint& s : surf_points(image, kMaxPoints)) {
+    d.points.emplace_back(static_cast<float>(s.pixel.x() - 0.5),
+                          static_cast<float>(s.pixel.y() - 0.5));
+    d.descriptors.push_back(cv::Mat(s.descriptor, true).reshape(1, 1));
+  }
+  return d;
+}
+
+Described describe(FeatureMethod method, const cv::Mat& image) {
+  switch (method) {
+    case FeatureMethod::sift:
+      return describe(cv::SIFT::create(kMaxPoints), image);
+    case FeatureMethod::orb:
+      return describe(cv::ORB::create(kMaxPoints), image);
+    case FeatureMethod::surf:
+      return describe_surf(image);
+    default:
+      return describe_hog(image);
+  }
+}
+
+// For each row of `from` its nearest in `to`, -1 where the second nearest is about as near.
+std::vector<int> nearest(const cv::Mat& from, const cv::Mat& to, int norm) {
+  std::vector<int> result(static_cast<std::size_t>(from.rows), -1);
+  std::vector<std::vector<cv::DMatch>> found;
+  cv::BFMatcher(norm).knnMatch(from, to, found, 2);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (found[i].size() == 2 && found[i][0].distance < kRatio * found[i][1].distance)
+      result[i] = found[i][0].trainIdx;
+  }
+  return result;
+}
+
+void add(FeatureMatches& matches, const cv::Point2f& a, const cv::Point2f& b) {
+  matches.first_px.emplace_back(a.x + 0.5, a.y + 0.5);
+  matches.second_px.emplace_back(b.x + 0.5, b.y + 0.5);
+}
+
+FeatureMatches match_flow(FeatureMethod method, const cv::Mat& first, const cv::Mat& second) {
+  FeatureMatches matches;
+  const std::vector<cv::Point2f> points = corners(first);
+  if (points.empty()) return matches;
+  if (method == FeatureMethod::farneback) {
+    const cv::Mat flow = farneback_flow(first, second);
+    for (const cv::Point2f& p : points) {
+      const cv::Vec2f f = flow.at<cv::Vec2f>(cvRound(p.y), cvRound(p.x));
+      add(matches, p, p + cv::Point2f(f[0], f[1]));
+    }
+    return matches;
+  }
+  std::vector<cv::Point2f> there;
+  std::vector<unsigned char> found;
+  cv::calcOpticalFlowPyrLK(first, second, points, there, found, cv::noArray(), {21, 21}, 4);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (found[i]) add(matches, points[i], there[i]);
+  return matches;
+}
+
+double cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+}  // namespace
+
+std::string name_of(FeatureMethod method) {
+  switch (method) {
+    case FeatureMethod::sift:
+      return "SIFT";
+    case FeatureMethod::surf:
+      return "SURF";
+    case FeatureMethod::orb:
+      return "ORB";
+    case FeatureMethod::hog:
+      return "HOG";
+    case FeatureMethod::farneback:
+      return "Farneback";
+    case FeatureMethod::lucas_kanade:
+      return "Lucas-Kanade";
+  }
+  fail("feature method {}: not known", static_cast<int>(method));
+}
+
+FeatureMatches match_features(FeatureMethod method, const cv::Mat& first, const cv::Mat& second) {
+  check(first.type() == CV_8U && second.type() == CV_8U && first.size() == second.size(),
+        "features: expected two 8-bit gray images of one size, found {} x {} and {} x {}",
+        first.cols, first.rows, second.cols, second.rows);
+  if (method == FeatureMethod::farneback || method == FeatureMethod::lucas_kanade)
+    return match_flow(method, first, second);
+  FeatureMatches matches;
+  const Described a = describe(method, first), b = describe(method, second);
+  if (a.descriptors.rows < 2 || b.descriptors.rows < 2) return matches;
+  const int norm = method == FeatureMethod::orb ? cv::NORM_HAMMING : cv::NORM_L2;
+  const std::vector<int> forward = nearest(a.descriptors, b.descriptors, norm);
+  const std::vector<int> backward = nearest(b.descriptors, a.descriptors, norm);
+  for (std::size_t i = 0; i < forward.size(); ++i) {
+    const int j = forward[i];
+    if (j >= 0 && backward[static_cast<std::size_t>(j)] == static_cast<int>(i))
+      add(matches, a.points[i], b.points[static_cast<std::size_t>(j)]);
+  }
+  return matches;
+}
+
+FeatureScore evaluate_feature(FeatureMethod method, const cv::Mat& first, const cv::Mat& second,
+                              std::uint64_t seed, double ransac_threshold_px) {
+  FeatureScore score;
+  const double start = cpu_seconds();
+  const FeatureMatches matches = match_features(method, first, second);
+  score.cpu_s = cpu_seconds() - start;
+  score.matches = static_cast<int>(matches.first_px.size());
+  if (matches.first_px.size() < kMinMatches) return score;
+  std::vector<cv::Point2d> from, to;
+  for (std::size_t i = 0; i < matches.first_px.size(); ++i) {
+    from.emplace_back(matches.second_px[i].x(), matches.second_px[i].y());
+    to.emplace_back(matches.first_px[i].x(), matches.first_px[i].y());
+  }
+  cv::UsacParams ransac;
+  ransac.isParallel = false;
+  ransac.maxIterations = 2000;
+  ransac.threshold = ransac_threshold_px;
+  ransac.sampler = cv::SAMPLING_UNIFORM;
+  ransac.score = cv::SCORE_METHOD_MSAC;
+  ransac.randomGeneratorState = static_cast<int>(
+      random_words(seed, Purpose::recon_ransac, 0, static_cast<std::uint64_t>(method))[0] >> 1);
+  cv::Mat mask;
+  const cv::Mat h = cv::findHomography(from, to, mask, ransac);
+  if (h.empty() || mask.total() != from.size()) return score;
+  std::vector<cv::Point2d> reprojected;
+  cv::perspectiveTransform(from, reprojected, h);
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < from.size(); ++i)
+    if (mask.at<unsigned char>(static_cast<int>(i)))
+      errors.push_back(cv::norm(reprojected[i] - to[i]));
+  if (errors.size() < kMinMatches) return score;
+  score.homography_found = true;
+  score.inliers = static_cast<int>(errors.size());
+  for (const double e : errors) score.mean_error_px += e / static_cast<double>(errors.size());
+  std::nth_element(errors.begin(), errors.begin() + static_cast<long>(errors.size() / 2),
+                   errors.end());
+  score.median_error_px = errors[errors.size() / 2];
+  return score;
+}
+
+}  // namespace rugae

@@ -1,0 +1,157 @@
+#include "recon/keyframes.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "cameras/camera.h"
+#include "core/files.h"
+#include "dataset/image_io.h"
+#include "recon/options.h"
+#include "synthetic_texture.h"
+
+namespace rugae {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::draw;
+using testing::Texture;
+using testing::to_8bit;
+
+constexpr int kWidth = 320, kHeight = 240;
+
+// A plain folder of frames in which a wall moves to the right by `steps` px a frame.
+class Sequence : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() /
+              ("rugae_keyframes_" +
+               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  FrameSource source(const std::vector<double>& steps_px, const PreprocessOptions& options) {
+    const Texture texture(1, 7.0, 60.0);
+    cv::Mat wide = draw(kWidth + 400, kHeight, texture);
+    double shift = 0.0;
+    for (std::size_t i = 0; i <= steps_px.size(); ++i) {
+      if (i > 0) shift += steps_px[i - 1];
+      cv::Mat bgr;
+      const cv::Rect view(static_cast<int>(shift), 0, kWidth, kHeight);  // whole pixels
+      cv::cvtColor(to_8bit(wide(view)), bgr, cv::COLOR_GRAY2BGR);
+      write_image(folder_ / (std::to_string(i) + ".png"), bgr);
+    }
+    Lens lens;
+    lens.width = kWidth;
+    lens.height = kHeight;
+    lens.fx = lens.fy = 160.0;
+    lens.cx = 160.0;
+    lens.cy = 120.0;
+    write_atomic(folder_ / "lens.yaml", lens_yaml(lens, "test"));
+    return FrameSource(Observations::open(folder_, folder_ / "lens.yaml"), options);
+  }
+
+  static PreprocessOptions plain() {
+    PreprocessOptions options;
+    options.devignette = false;
+    return options;
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(Sequence, AKeyFrameIsTakenWhereTheMeanFlowReachesTheThreshold) {
+  // 30 px at 640 px width are 15 px here: four steps of 4 px.
+  const FrameSource frames = source(std::vector<double>(12, 4.0), plain());
+  Progress progress(Progress::Output::silent);
+  const Keyframes keys = select_keyframes(frames, {}, progress);
+  EXPECT_EQ(keys.frames, (std::vector<int>{0, 4, 8, 12}));
+  ASSERT_EQ(keys.mean_flow_px.size(), 4u);
+  EXPECT_EQ(keys.mean_flow_px[0], 0.0);
+  // The wall that enters at the border has no counterpart; elsewhere the flow is 16 px.
+  for (int i = 1; i < 4; ++i)
+    EXPECT_NEAR(keys.mean_flow_px[static_cast<std::size_t>(i)], 16.0, 0.8);
+}
+
+TEST_F(Sequence, AfterTheGapTheFrameFurthestAwayIsTaken) {
+  // Out by 10 px, and back: never 15 px from the first. Frame 2 is the furthest of the first five.
+  const FrameSource frames = source({5, 5, -3, -3, -2, 0, 0, 0, 0, 0}, plain());
+  KeyframeOptions options;
+  options.max_gap = 5;
+  Progress progress(Progress::Output::silent);
+  const Keyframes keys = select_keyframes(frames, options, progress);
+  ASSERT_GE(keys.frames.size(), 3u);
+  EXPECT_EQ(keys.frames[1], 2);
+  EXPECT_NEAR(keys.mean_flow_px[1], 10.0, 0.8);
+  // Compared again with frame 2, frames 3 to 7 are 3, 6, 8, 8, 8 px away: the first of the largest,
+  // up to the flow's noise.
+  EXPECT_GE(keys.frames[2], 5);
+  EXPECT_NEAR(keys.mean_flow_px[2], 8.0, 0.8);
+}
+
+TEST_F(Sequence, TheSameForAnyNumberOfThreads) {
+  const FrameSource frames = source({3, 9, 2, 7, 7, 1, 12, 3, 3}, plain());
+  Progress progress(Progress::Output::silent);
+  const Keyframes many = select_keyframes(frames, {}, progress);
+  const int threads = cv::getNumThreads();
+  cv::setNumThreads(1);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const Keyframes single = select_keyframes(frames, {}, progress);
+  cv::setNumThreads(threads);
+  EXPECT_EQ(many.frames, single.frames);
+  EXPECT_EQ(many.mean_flow_px, single.mean_flow_px);
+}
+
+TEST_F(Sequence, FramesAreWhatTheStagesMake) {
+  PreprocessOptions options = plain();
+  options.reflections.suppress_for_map = false;
+  const FrameSource frames = source({4, 4}, options);
+  EXPECT_EQ(frames.size(), 3);
+  EXPECT_TRUE(frames.vignetting_profile().empty());
+  const Frame frame = frames.frame(1);
+  EXPECT_EQ(frame.index, 1);
+  EXPECT_EQ(frame.gray.type(), CV_8U);
+  EXPECT_EQ(frame.map_bgr.type(), CV_8UC3);
+  EXPECT_EQ(cv::countNonZero(frame.valid), kWidth * kHeight);
+  EXPECT_EQ(cv::norm(frame.gray, frames.gray(1), cv::NORM_INF), 0.0);
+  // A lens without distortion: undistortion is the identity.
+  const cv::Mat original = frames.observations().image(1);
+  EXPECT_EQ(cv::norm(frame.map_bgr, original, cv::NORM_INF), 0.0);
+}
+
+TEST_F(Sequence, VignettingIsEstimatedOnce) {
+  const FrameSource frames = source({4, 4}, PreprocessOptions());
+  ASSERT_EQ(frames.vignetting_profile().size(), 257u);
+  EXPECT_NEAR(frames.vignetting_profile().front(), 1.0, 1e-12);
+  EXPECT_EQ(cv::norm(frames.gray(2), frames.frame(2).gray, cv::NORM_INF), 0.0);
+}
+
+TEST(Flow, FollowsTheWallNotTheLight) {
+  // The wall moves by 24 px under a spot of light that stands still.
+  const Texture texture(2, 7.0, 60.0);
+  const auto picture = [&](double shift) {
+    return to_8bit(draw(kWidth, kHeight, [&](const Vec2& p) {
+      const double light = std::exp(-(p - Vec2(160, 120)).squaredNorm() / (2.0 * 60.0 * 60.0));
+      return (0.1 + 0.9 * light) * texture(p + Vec2(shift, 0.0));
+    }));
+  };
+  const cv::Mat flow = farneback_flow(picture(0.0), picture(24.0));
+  std::vector<double> errors;
+  for (int y = 20; y < kHeight - 20; y += 5)
+    for (int x = 50; x < kWidth - 50; x += 5)
+      errors.push_back(cv::norm(flow.at<cv::Vec2f>(y, x) - cv::Vec2f(-24.0F, 0.0F)));
+  std::sort(errors.begin(), errors.end());
+  EXPECT_TRUE(errors[errors.size() / 2] <= 0.3) << errors[errors.size() / 2];
+  EXPECT_TRUE(errors[errors.size() * 9 / 10] <= 1.0) << errors[errors.size() * 9 / 10];
+}
+
+}  // namespace
+}  // namespace rugae
