@@ -261,6 +261,43 @@ TEST(Map, InsideOfASphereComesBackRound) {
               0.1 * 4.0 / 3.0 * kPi * std::pow(kRadius, 3));
 }
 
+// A steep wall seen in a mosaic whose corner is not the anchor's: half a pixel of shift anywhere is
+// half a pixel's width on the wall times the slope, 0.2 mm and more.
+TEST(Map, SteepWallIsNotShiftedByHalfAPixel) {
+  const Lens lens = test_lens();
+  const Vec3 normal(-0.6, 0.3, 1.0);
+  constexpr double kOffset = 50.0, kHalfOfTheShift = 0.1;
+  const Wall wall = {[&](const Vec3& origin, const Vec3& direction) {
+                       return (kOffset - normal.dot(origin)) / normal.dot(direction);
+                     },
+                     [](const Vec3&) -> uchar { return 150; }};
+  Scene scene = observe(wall, {Rigid3()}, lens, 5);
+  Mosaic& mosaic = scene.mosaics[0];
+  const cv::Rect part(20, 15, 110, 80);
+  mosaic.bgr = mosaic.bgr(part).clone();
+  mosaic.valid = mosaic.valid(part).clone();
+  mosaic.origin_px = Vec2(part.x, part.y);
+  const auto depths = place_all(scene, lens);
+  ASSERT_TRUE(depths[0]);
+  double bias = 0.0;
+  int count = 0;
+  for (int y = 0; y < part.height; ++y)
+    for (int x = 0; x < part.width; ++x) {
+      const Vec3 ray = lens.unproject(Vec2(x + 0.5, y + 0.5) + mosaic.origin_px).value();
+      const float z = depths[0]->depth.at<float>(y, x);
+      if (!(z > 0.0f)) continue;
+      bias += z - kOffset / normal.dot(ray) * ray.z();
+      ++count;
+    }
+  ASSERT_GE(count, 8000);
+  EXPECT_LE(std::abs(bias / count), kHalfOfTheShift);
+  const TriangleMesh mesh = fuse_map(scene.mosaics, depths, scene.structure, lens, MapOptions{});
+  ASSERT_FALSE(mesh.empty());
+  double mesh_bias = 0.0;
+  for (const Vec3& vertex : mesh.vertices) mesh_bias += normal.dot(vertex) - kOffset;
+  EXPECT_LE(std::abs(mesh_bias / static_cast<double>(mesh.vertices.size())), kHalfOfTheShift);
+}
+
 TEST(Map, ScalingTheWorldScalesTheMapOnly) {
   const Lens lens = wide_lens();
   constexpr double kScale = 1024.0;  // a power of two: exact in floating point
