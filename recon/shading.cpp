@@ -107,10 +107,16 @@ LightEstimate estimate_light(const cv::Mat& intensity, const cv::Mat& valid) {
   return light;
 }
 
-// f(Z) = E - R,  E = I / albedo,  R = max(0, cos(s) + p cos(t) sin(s) + q sin(t) sin(s)) / n,
-// n = sqrt(1 + p^2 + q^2),  p = Z(x,y) - Z(x-1,y),  q = Z(x,y) - Z(x,y-1).
-// Since dp/dZ = dq/dZ = 1:
-//   df/dZ = -[ (cos(t) sin(s) + sin(t) sin(s)) / n - (p + q) R / n^2 ].
+// R = max(0, cos(s) + p cos(t) sin(s) + q sin(t) sin(s)) / n,  n = sqrt(1 + p^2 + q^2).
+// p = Z(x,y) - Z(x-1,y) and q = Z(x,y) - Z(x,y-1), so dp/dZ = dq/dZ = 1 and
+//   dR/dZ = (cos(t) sin(s) + sin(t) sin(s)) / n - (p + q) R / n^2.
+Reflectance reflectance(double p, double q, const Vec3& light) {
+  const double n2 = 1.0 + p * p + q * q, n = std::sqrt(n2);
+  const double value = std::max(0.0, (light.z() + p * light.x() + q * light.y()) / n);
+  return {value, (light.x() + light.y()) / n - (p + q) * value / n2};
+}
+
+// f(Z) = E - R,  E = I / albedo,  df/dZ = -dR/dZ.
 // The update of Tsai and Shah (equations 10 to 13), Newton's step weighted by a scalar Kalman gain:
 //   K = S f' / (W + S f'^2),   Z <- Z - K f,   S <- (1 - K f') S.
 // The neighbours' depths are those of the iteration before, so the order of pixels does not matter.
@@ -123,9 +129,8 @@ cv::Mat tsai_shah(const cv::Mat& intensity, const cv::Mat& valid, const LightEst
   const bool frontal = light.slant_rad < kMinSlantRad;
   const double slant = frontal ? kMinSlantRad : light.slant_rad;
   const double tilt = frontal ? kTopLeftRad : light.tilt_rad;
-  const double sx = std::cos(tilt) * std::sin(slant);
-  const double sy = std::sin(tilt) * std::sin(slant);
-  const double sz = std::cos(slant);
+  const Vec3 to_light(std::cos(tilt) * std::sin(slant), std::sin(tilt) * std::sin(slant),
+                      std::cos(slant));
 
   cv::Mat before = cv::Mat::zeros(intensity.size(), CV_32F), after = before.clone();
   cv::Mat variance(intensity.size(), CV_32F, cv::Scalar(options.s_0));
@@ -142,11 +147,10 @@ cv::Mat tsai_shah(const cv::Mat& intensity, const cv::Mat& valid, const LightEst
         // No slope across the border of what is known.
         const double p = x > 0 && inside(y, x - 1) ? z - row[x - 1] : 0.0;
         const double q = y > 0 && inside(y - 1, x) ? z - above[x] : 0.0;
-        const double n2 = 1.0 + p * p + q * q, n = std::sqrt(n2);
-        const double reflectance = std::max(0.0, (sz + p * sx + q * sy) / n);
+        const Reflectance r = reflectance(p, q, to_light);
         const double shade = std::min(intensity.at<float>(y, x) / light.albedo, 1.0);
-        const double f = shade - reflectance;
-        const double df = -((sx + sy) / n - (p + q) * reflectance / n2);
+        const double f = shade - r.value;
+        const double df = -r.by_depth;
         const double gain = s_row[x] * df / (options.w_n + s_row[x] * df * df);
         out[x] = static_cast<float>(z - gain * f);
         s_row[x] = static_cast<float>((1.0 - gain * df) * s_row[x]);

@@ -9,6 +9,7 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "core/types.h"
 #include "recon/options.h"
 
 namespace rugae {
@@ -32,6 +33,15 @@ ShadingMoments shading_moments(double slant_rad);
 /// Zheng and Chellappa, TPAMI 13 (1991) 680-702, doi:10.1109/34.85658. `intensity` is CV_32F,
 /// `valid` CV_8U (empty: all); an image without light gives the default.
 LightEstimate estimate_light(const cv::Mat& intensity, const cv::Mat& valid);
+
+/// What a surface of albedo 1 and slopes p, q reflects of the light from `to_light` (unit), and its
+/// derivative with respect to the depth Z of the pixel whose backward differences p and q are.
+/// Where the surface faces away from the light the value is 0 and the derivative the one of the lit
+/// side, which is what brings it back.
+struct Reflectance {
+  double value = 0.0, by_depth = 0.0;
+};
+Reflectance reflectance(double p, double q, const Vec3& to_light);
 
 /// The relief Z (CV_32F, px, towards larger depth, zero where not valid) of an image (CV_32F).
 cv::Mat tsai_shah(const cv::Mat& intensity, const cv::Mat& valid, const LightEstimate& light,

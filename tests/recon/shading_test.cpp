@@ -106,6 +106,24 @@ TEST(Shading, TiltPointsToTheLightOnASphere) {
   }
 }
 
+// Z moves both backward differences by one: the derivative is that of R(p + h, q + h).
+TEST(Shading, DerivativeByDepthIsTheDifferenceQuotient) {
+  constexpr double kStep = 1e-5, kTruncation = 1e-8;  // third derivatives are of order 1
+  int checked = 0;
+  for (int i = 0; i < 200; ++i) {
+    const auto n = random_normal(11, Purpose::test, 0, i);
+    const double p = 0.5 * n[0], q = 0.5 * n[1];
+    const Vec3 light = light_direction(0.3 + 0.1 * n[2], n[3]);
+    if (light.z() + p * light.x() + q * light.y() < 0.05) continue;  // in shadow
+    const double quotient = (reflectance(p + kStep, q + kStep, light).value -
+                             reflectance(p - kStep, q - kStep, light).value) /
+                            (2.0 * kStep);
+    EXPECT_NEAR(reflectance(p, q, light).by_depth, quotient, kTruncation);
+    ++checked;
+  }
+  EXPECT_GE(checked, 150);
+}
+
 TEST(Shading, DarkPictureGivesTheDefaultLight) {
   const LightEstimate found = estimate_light(cv::Mat::zeros(8, 8, CV_32F), {});
   EXPECT_EQ(found.slant_rad, 0.0);
