@@ -162,7 +162,9 @@ TEST(Calibrate, FindsDrawnBoardsMirroredOrNot) {
       for (const Vec2& q : truth.corners_px) nearest = std::min(nearest, (q - seen).norm());
       EXPECT_TRUE(nearest <= 0.15) << nearest;  // of edges drawn with 3 x 3 rays
     }
-    if (!mirrored) EXPECT_EQ(find_board_size(gray), std::make_pair(kColumns, kRows));
+    if (!mirrored) {
+      EXPECT_EQ(find_board_size(gray), std::make_pair(kColumns, kRows));
+    }
   }
 }
 

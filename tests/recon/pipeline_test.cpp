@@ -3,8 +3,10 @@
 
 #include "recon/pipeline.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
 #include <opencv2/core.hpp>
 
@@ -24,7 +26,7 @@ constexpr double kStepRad = 0.035;  // about 0.8 mm and 2 degrees between frames
 class Pipeline : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    root_ = fs::path(testing::TempDir()) / "rugae_pipeline_test";
+    root_ = fs::path(testing::TempDir()) / fmt::format("rugae_pipeline_{}", getpid());
     fs::remove_all(root_);
     std::vector<Rigid3> path;
     for (int i = 0; i < kFrames; ++i) path.push_back(synthetic::world_from_camera(i * kStepRad));
