@@ -104,19 +104,19 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world, co
     int projected = 0;
     for (const Corner* corner : c)
       if (corner->pixel) box.extend(*corner->pixel), ++projected;
-    double margin = 1.0;
+    const double size_px = projected == 3 ? box.sizes().maxCoeff() : 0.0;
+    const double curved = std::min(1.0, size_px / (kCurvedShare * lens.width));
     Directions seen;
-    if (projected == 3) {
-      const double size_px = box.sizes().maxCoeff();
-      const double curved = std::min(1.0, size_px / (kCurvedShare * lens.width));
-      margin += kCurvedEdgeMargin * curved * size_px;
-    } else {
-      // Part of the triangle lies beyond what the lens sees: it may cover anything within its cone.
+    if (projected < 3 || curved == 1.0) {
+      // Far off the axis the lens maps the little that a triangle spans to boxes of any size: what
+      // counts there are directions.
       seen = directions_of(c[0]->p_cam, c[1]->p_cam, c[2]->p_cam);
       const double off_axis_rad = std::acos(std::clamp(seen.centre.z(), -1.0, 1.0));
       if (off_axis_rad - seen.half_angle_rad > picture_angle_rad) continue;
-      box = {Vec2(0, 0), Vec2(lens.width, lens.height)};
     }
+    // Part of a triangle that is not projected whole may cover anything within its cone.
+    if (projected < 3) box = {Vec2(0, 0), Vec2(lens.width, lens.height)};
+    const double margin = 1.0 + kCurvedEdgeMargin * curved * size_px;
     const double seen_cosine = std::cos(seen.half_angle_rad) - kCosineRounding;
     const int left = std::max(0, static_cast<int>(std::floor(box.min().x() - margin)));
     const int top = std::max(0, static_cast<int>(std::floor(box.min().y() - margin)));
