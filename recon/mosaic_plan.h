@@ -31,9 +31,10 @@ std::optional<std::vector<Vec2>> outline_on_anchor(const Mat3& anchor_from_membe
                                                    const Lens& lens);
 
 /// Every placed key frame is a member of some mosaic. Anchors are chosen greedily, the one that
-/// brings most key frames not yet covered first, of equals the most central one. A member is reached from its
-/// anchor by a chain of aligned pairs through members (fewest links, then most inliers), looks
-/// within options.max_view_angle_rad of the anchor's view, and its homography is not degenerate.
+/// brings most key frames not yet covered first, of equals the most central one. A member is
+/// reached from its anchor by a chain of aligned pairs through members (fewest links, then most
+/// inliers), looks within options.max_view_angle_rad of the anchor's view, and its homography is
+/// not degenerate.
 std::vector<MosaicPlan> plan_mosaics(const Structure& structure,
                                      const std::vector<PairAlignment>& pairs, const Lens& lens,
                                      const MosaicOptions& options);

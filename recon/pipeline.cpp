@@ -99,7 +99,7 @@ Estimate reconstruct(const Observations& observations, const ReconOptions& optio
   const EstimateLayout layout{out};
   make_folder(out);
   progress.begin("preprocessing");
-  const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());  // of the caller
+  const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());    // of the caller
   const FrameSource frames(observations, options.preprocess);                    // section 2.1
   const Keyframes keys = select_keyframes(frames, options.keyframes, progress);  // algorithm 2
   // Algorithm 3: steps 2 to 6, pairs; step 7, all poses jointly.
