@@ -4,24 +4,15 @@
 #include <fstream>
 
 #include "cameras/camera.h"
-#include "core/check.h"
 #include "core/files.h"
 #include "core/presets.h"
 #include "core/units.h"
+#include "tests/message_of.h"
 
 namespace rugae {
 namespace {
 
 constexpr double kRoundTrip_px = 1e-9;
-
-std::string message_of(const auto& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 void expect_round_trip(const Lens& lens) {
   const LensProjector fast(lens);

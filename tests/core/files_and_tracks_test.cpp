@@ -3,25 +3,16 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/check.h"
 #include "core/files.h"
 #include "core/pose_track.h"
 #include "core/presets.h"
 #include "core/random.h"
+#include "tests/message_of.h"
 
 namespace rugae {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string message_of(const auto& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 class Files : public ::testing::Test {
  protected:

@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/check.h"
 #include "core/files.h"
 #include "core/mesh_io.h"
 #include "core/random.h"
 #include "core/units.h"
+#include "tests/message_of.h"
 
 namespace rugae {
 namespace {
@@ -42,15 +42,6 @@ TriangleMesh sphere(double radius_mm, int levels) {
   }
   for (Vec3& v : m.vertices) v *= radius_mm;
   return m;
-}
-
-std::string message_of(const auto& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 class MeshFiles : public ::testing::Test {

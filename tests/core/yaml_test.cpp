@@ -2,20 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include "core/check.h"
 #include "core/units.h"
+#include "tests/message_of.h"
 
 namespace rugae {
 namespace {
-
-std::string message_of(const auto& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 TEST(Yaml, ReadsWhatIsThereAndKeepsDefaults) {
   auto yaml = YamlReader::from_text(
