@@ -73,18 +73,25 @@ TEST_F(TrajectoryFile, LikeTakesWhatIsNotGiven) {
 
 TEST(TrajectoryPreset, UnknownName) {
   EXPECT_EQ(error_of([] { load_trajectory("seven"); }),
-            "trajectory 'seven': no such preset; known: 1, 2, 3, 4, 5, 6");
+            "trajectory 'seven': no such preset; known: 1, 2, 3, 4, 5, 6, inspection");
 }
 
 TEST(TrajectoryPreset, LengthsNoiseAndOilOfTheSix) {
-  EXPECT_EQ(preset_names("trajectories"), (std::vector<std::string>{"1", "2", "3", "4", "5", "6"}));
-  for (const std::string& name : preset_names("trajectories")) {
+  for (const std::string name : {"1", "2", "3", "4", "5", "6"}) {
     const TrajectoryOptions options = load_trajectory(name);
     EXPECT_EQ(std::to_string(options.paper_number), name);
     EXPECT_EQ(options.name, name);
     EXPECT_EQ(options.read_noise_factor > 1.0, name == "5");
     EXPECT_EQ(options.oil > 0.0, name == "6");
   }
+}
+
+// The demo's short path is trajectory 1 but for its length, and none of the paper's.
+TEST(TrajectoryPreset, InspectionIsNotOfThePaper) {
+  const TrajectoryOptions inspection = load_trajectory("inspection"), one = load_trajectory("1");
+  EXPECT_EQ(inspection.paper_number, 0);
+  EXPECT_EQ(inspection.clearance_mm, one.clearance_mm);
+  EXPECT_LT(inspection.length_cm, one.length_cm);
 }
 
 TEST(PlanError, NoPlaceHasTheClearance) {
