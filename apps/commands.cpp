@@ -36,7 +36,8 @@ void add_json_flag(CLI::App& command, bool& json) {
 void add_simulate(CLI::App& app) {
   struct Arguments {
     SimulateOptions options;
-    fs::path out;
+    fs::path out, settings;
+    std::vector<std::string> changes;
     bool json = false, clean = false, no_labels = false;
   };
   const auto a = std::make_shared<Arguments>();
@@ -57,13 +58,18 @@ void add_simulate(CLI::App& app) {
   command.add_option("--seed", a->options.seed, "Draws the stomach, the path and the noise")
       ->capture_default_str();
   command.add_option("--threads", a->options.threads, "0: all processors")->capture_default_str();
+  command.add_option("--options", a->settings, "YAML with the settings of light, lens and sensor");
+  command.add_option("--set", a->changes, "One setting by its path, such as sensor.noise=false");
   command.add_flag("--clean", a->clean, "No sensor noise");
   command.add_flag("--no-labels", a->no_labels, "Frames and poses only");
   command.add_option("--out", a->out, "The dataset's folder")->required();
   add_json_flag(command, a->json);
   command.callback([a] {
-    a->options.noise = !a->clean;
-    a->options.labels = !a->no_labels;
+    RenderSettings& render = a->options.render;
+    if (!a->settings.empty()) read_settings(YamlReader::from_file(a->settings), render);
+    for (const std::string& change : a->changes) change_setting(change, render);
+    if (a->clean) render.sensor.noise = false;
+    if (a->no_labels) render.labels = false;
     Progress progress;
     const SimulateResult r = simulate(a->options, a->out, progress);
     const int frames = r.frames + r.skipped;

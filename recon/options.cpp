@@ -1,13 +1,10 @@
 #include "recon/options.h"
 
-#include <fmt/ranges.h>
-
-#include <nlohmann/json.hpp>
+#include <string>
 #include <utility>
 #include <vector>
 
-#include "core/check.h"
-#include "core/units.h"
+#include "core/fields.h"
 
 namespace rugae {
 namespace {
@@ -15,8 +12,7 @@ namespace {
 const std::vector<std::string> kMethods = {"paper"};
 const std::vector<std::string> kInpaintings = {"telea", "navier_stokes"};
 
-// One list of fields a struct: the key, the variable, and the range that reading, checking and
-// writing share.
+}  // namespace
 
 template <typename Visitor>
 void fields(Visitor& v, ReflectionOptions& o) {
@@ -97,141 +93,19 @@ void fields(Visitor& v, ReconOptions& o) {
   v.seed("seed", o.seed);
 }
 
-// `place` is where the value stands: the file's line and column, or the struct's name. A NaN is out
-// of every range.
-template <typename T>
-void check_range(const std::string& place, const std::string& key, T value, T low, T high) {
-  check(value >= low && value <= high, "{}: {} is {}, expected {} to {}", place, key, value, low,
-        high);
-}
+void ReflectionOptions::check() const { check_fields(*this, "reflections"); }
+void PreprocessOptions::check() const { check_fields(*this, "preprocess"); }
+void KeyframeOptions::check() const { check_fields(*this, "keyframes"); }
+void AlignOptions::check() const { check_fields(*this, "align"); }
+void TrackOptions::check() const { check_fields(*this, "tracks"); }
+void BundleOptions::check() const { check_fields(*this, "bundle"); }
+void MosaicOptions::check() const { check_fields(*this, "mosaic"); }
+void ShadingOptions::check() const { check_fields(*this, "shading"); }
+void MapOptions::check() const { check_fields(*this, "map"); }
+void ReconOptions::check() const { check_fields(*this, "recon"); }
 
-void check_word(const std::string& place, const std::string& key, const std::string& value,
-                const std::vector<std::string>& known) {
-  for (const std::string& word : known) {
-    if (value == word) return;
-  }
-  fail("{}: {} '{}' is not known, expected {}{}", place, key, value, fmt::join(known, " or "),
-       did_you_mean(value, known));
-}
+void read_options(YamlReader yaml, ReconOptions& options) { read_fields(std::move(yaml), options); }
 
-struct Checker {
-  std::string place;
-
-  void flag(const char*, bool&) {}
-  void seed(const char*, std::uint64_t&) {}
-  template <typename T, typename Bound>
-  void number(const char* key, T& value, Bound low, Bound high) {
-    check_range<T>(place, key, value, low, high);
-  }
-  void angle(const std::string& key, double& value_rad, double low_rad, double high_rad) {
-    check_range(place, key + "_rad", value_rad, low_rad, high_rad);
-  }
-  template <typename Enum>
-  void choice(const char* key, Enum& value, const std::vector<std::string>& names) {
-    check_range<int>(place, key, static_cast<int>(value), 0, static_cast<int>(names.size()) - 1);
-  }
-  void word(const char* key, std::string& value, const std::vector<std::string>& known) {
-    check_word(place, key, value, known);
-  }
-  template <typename Options>
-  void section(const char* key, Options& options) {
-    Checker inner{place + "." + key};
-    fields(inner, options);
-  }
-};
-
-struct Reader {
-  YamlReader yaml;
-
-  void flag(const char* key, bool& value) { yaml.get(key, value); }
-  void seed(const char* key, std::uint64_t& value) { yaml.get(key, value); }
-  template <typename T, typename Bound>
-  void number(const char* key, T& value, Bound low, Bound high) {
-    yaml.get(key, value);
-    check_range<T>(yaml.where(key), key, value, low, high);
-  }
-  void angle(const std::string& key, double& value_rad, double low_rad, double high_rad) {
-    yaml.get_deg(key + "_deg", value_rad);
-    check_range(yaml.where(key + "_deg"), key + "_deg", deg_from_rad(value_rad),
-                deg_from_rad(low_rad), deg_from_rad(high_rad));
-  }
-  template <typename Enum>
-  void choice(const char* key, Enum& value, const std::vector<std::string>& names) {
-    int index = static_cast<int>(value);
-    yaml.get_choice(key, names, index);
-    value = static_cast<Enum>(index);
-  }
-  void word(const char* key, std::string& value, const std::vector<std::string>& known) {
-    yaml.get(key, value);
-    check_word(yaml.where(key), key, value, known);
-  }
-  template <typename Options>
-  void section(const char* key, Options& options) {
-    if (std::optional<YamlReader> child = yaml.child(key)) {
-      Reader inner{std::move(*child)};
-      fields(inner, options);
-      inner.yaml.finish();
-    }
-  }
-};
-
-struct Writer {
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
-
-  void flag(const char* key, bool& value) { json[key] = value; }
-  void seed(const char* key, std::uint64_t& value) { json[key] = value; }
-  template <typename T, typename Bound>
-  void number(const char* key, T& value, Bound, Bound) {
-    json[key] = value;
-  }
-  void angle(const std::string& key, double& value_rad, double, double) {
-    json[key + "_rad"] = value_rad;
-  }
-  template <typename Enum>
-  void choice(const char* key, Enum& value, const std::vector<std::string>& names) {
-    json[key] = names[static_cast<std::size_t>(value)];
-  }
-  void word(const char* key, std::string& value, const std::vector<std::string>&) {
-    json[key] = value;
-  }
-  template <typename Options>
-  void section(const char* key, Options& options) {
-    Writer inner;
-    fields(inner, options);
-    json[key] = std::move(inner.json);
-  }
-};
-
-template <typename Options>
-void check_all(Options options, const char* name) {
-  Checker checker{name};
-  fields(checker, options);
-}
-
-}  // namespace
-
-void ReflectionOptions::check() const { check_all(*this, "reflections"); }
-void PreprocessOptions::check() const { check_all(*this, "preprocess"); }
-void KeyframeOptions::check() const { check_all(*this, "keyframes"); }
-void AlignOptions::check() const { check_all(*this, "align"); }
-void TrackOptions::check() const { check_all(*this, "tracks"); }
-void BundleOptions::check() const { check_all(*this, "bundle"); }
-void MosaicOptions::check() const { check_all(*this, "mosaic"); }
-void ShadingOptions::check() const { check_all(*this, "shading"); }
-void MapOptions::check() const { check_all(*this, "map"); }
-void ReconOptions::check() const { check_all(*this, "recon"); }
-
-void read_options(YamlReader yaml, ReconOptions& options) {
-  Reader reader{std::move(yaml)};
-  fields(reader, options);
-  reader.yaml.finish();
-}
-
-std::string to_json_text(const ReconOptions& options) {
-  Writer writer;
-  ReconOptions copy = options;
-  fields(writer, copy);
-  return writer.json.dump();
-}
+std::string to_json_text(const ReconOptions& options) { return json_of_fields(options).dump(); }
 
 }  // namespace rugae

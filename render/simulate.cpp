@@ -6,7 +6,6 @@
 #include <condition_variable>
 #include <future>
 #include <mutex>
-#include <nlohmann/json.hpp>
 
 #include "core/check.h"
 #include "core/files.h"
@@ -54,8 +53,8 @@ DatasetInfo info_of(const SimulateOptions& options, int frames) {
   info.resolution = options.resolution;
   info.seed = options.seed;
   info.frames = frames;
-  info.labels = options.labels;
-  info.text = nlohmann::json{{"noise", options.noise}, {"vignetting", options.vignetting}}.dump();
+  info.labels = options.render.labels;
+  info.text = settings_json(options.render);
   return info;
 }
 
@@ -163,6 +162,7 @@ class FrameLoop {
 }  // namespace
 
 void SimulateOptions::check() const {
+  render.check();
   rugae::check(frames == 0 || frames >= 2, "frames is {}, expected at least 2", frames);
   rugae::check(only_frame >= -1, "only-frame is {}, expected at least 0", only_frame);
   rugae::check(threads >= 0, "threads is {}, expected at least 0", threads);
@@ -207,9 +207,10 @@ SimulateResult simulate(const SimulateOptions& options, const std::filesystem::p
 
   progress.begin("frames", todo.size());
   if (!todo.empty()) {
-    const FrameRenderer renderer(scene, camera, {options.vignetting, options.labels});
-    const SensorModel sensor(camera.sensor,
-                             {options.noise, trajectory.read_noise_factor, options.seed});
+    const FrameRenderer renderer(scene, camera,
+                                 {options.render.lens.vignetting, options.render.labels});
+    const SensorModel sensor(
+        camera.sensor, {options.render.sensor.noise, trajectory.read_noise_factor, options.seed});
     ExposureLog log(out, exposures);
     FrameLoop loop(renderer, sensor, writer, path.track, &log);
     const Clock::time_point loop_start = Clock::now();

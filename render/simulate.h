@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/progress.h"
+#include "render/settings.h"
 
 namespace rugae {
 
@@ -17,10 +18,8 @@ struct SimulateOptions {
   int frames = 0;       // 0: as many as in the paper for this camera and trajectory, or in the file
   int only_frame = -1;  // replays a single frame
   std::uint64_t seed = 1;
-  bool noise = true;  // shot and read noise
-  bool vignetting = true;
-  bool labels = true;  // truth images
-  int threads = 0;     // 0: all
+  int threads = 0;  // 0: all
+  RenderSettings render;
   /// Throws Error naming the field.
   void check() const;
 };

@@ -126,6 +126,7 @@ Scene load_scene(const SceneRequest& request) {
               .rest_positions = {},
               .regions = std::move(regions),
               .mucosa = Mucosa(file.mucosa, request.seed),
+              .motion = {},
               .seed = request.seed,
               .notes = std::move(wall.notes)};
   scene.rest_positions = scene.wall.vertices;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -65,13 +66,19 @@ class Mucosa {
   std::shared_ptr<const Tiles> tiles_;
 };
 
+/// Moves the wall: fills `vertices_mm` with where the wall's vertices are at `time_s` (seconds
+/// since the first frame). A smooth function of time, the same at every call; safe from many
+/// threads.
+using WallMotion = std::function<void(double time_s, std::vector<Vec3>& vertices_mm)>;
+
 struct Scene {
   std::string name;
-  TriangleMesh wall;                 // with vertex normals
+  TriangleMesh wall;                 // at rest, with vertex normals
   std::vector<Vec3> rest_positions;  // of the vertices: where they are, relief and all, before any
                                      // deformation; what the mucosa is a function of
   std::vector<Region> regions;       // of the vertices
   Mucosa mucosa;
+  WallMotion motion;  // empty: the wall keeps still
   std::uint64_t seed = 1;
   std::vector<std::string> notes;  // of an imported mesh: what was found and done, a line each
 };

@@ -40,8 +40,7 @@ json dataset_key(const StudyOptions& study, const Cell& cell) {
           {"resolution", s.resolution},
           {"frames", s.frames},
           {"seed", s.seed},
-          {"noise", s.noise},
-          {"vignetting", s.vignetting}};
+          {"render", json::parse(settings_json(s.render))}};
 }
 
 std::string short_hash(const json& key) {

@@ -53,8 +53,7 @@ StudyOptions read_study_text(const std::string& text, const std::string& name) {
   yaml.get("resolution", study.simulate.resolution);
   yaml.get("seed", study.simulate.seed);
   yaml.get("frames", study.simulate.frames);
-  yaml.get("noise", study.simulate.noise);
-  yaml.get("vignetting", study.simulate.vignetting);
+  if (auto render = yaml.child("render")) read_settings(*render, study.simulate.render);
   check(study.simulate.frames >= 0, "{}: frames is {}, expected at least 0 (0: as in the paper)",
         yaml.where("frames"), study.simulate.frames);
   read_names(yaml, "cameras", "camera", study.cameras);

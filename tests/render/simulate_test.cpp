@@ -174,11 +174,11 @@ TEST_F(Simulate, OnlyFrameIsThatFrameOfTheWholeRun) {
 TEST_F(Simulate, SwitchesActAlone) {
   options_.frames = 2;
   run("noisy");
-  options_.noise = false;
+  options_.render.sensor.noise = false;
   run("clean");
-  options_.vignetting = false;
+  options_.render.lens.vignetting = false;
   run("flat");
-  options_.labels = false;
+  options_.render.labels = false;
   run("bare");
   const DatasetLayout noisy{root_ / "noisy"}, clean{root_ / "clean"}, flat{root_ / "flat"},
       bare{root_ / "bare"};

@@ -23,14 +23,15 @@ std::string error_of(const std::string& text) {
 TEST(StudyFile, ReadsWhatItSays) {
   const StudyOptions study =
       read_study_text(kHead +
-                          "title: A title\nframes: 30\nseed: 7\nnoise: false\nresolution: coarse\n"
+                          "title: A title\nframes: 30\nseed: 7\nrender: {sensor: {noise: "
+                          "false}}\nresolution: coarse\n"
                           "gates: [{metric: tracking.tracked_share, above: 0.5, reason: why}]\n",
                       "study.yaml");
   EXPECT_EQ(study.title, "A title");
   EXPECT_EQ(study.simulate.frames, 30);
   EXPECT_EQ(study.simulate.seed, 7u);
   EXPECT_EQ(study.recon.seed, 7u);
-  EXPECT_FALSE(study.simulate.noise);
+  EXPECT_FALSE(study.simulate.render.sensor.noise);
   EXPECT_EQ(study.simulate.resolution, "coarse");
   ASSERT_EQ(study.gates.size(), 1u);
   EXPECT_EQ(study.gates[0].above, 0.5);

@@ -1,0 +1,47 @@
+#include "render/settings.h"
+
+#include "core/fields.h"
+
+namespace rugae {
+
+template <typename Visitor>
+void fields(Visitor& v, LensSettings& o) {
+  v.flag("vignetting", o.vignetting);
+}
+
+template <typename Visitor>
+void fields(Visitor& v, SensorSettings& o) {
+  v.flag("noise", o.noise);
+}
+
+template <typename Visitor>
+void fields(Visitor& v, RenderSettings& o) {
+  v.section("lens", o.lens);
+  v.section("sensor", o.sensor);
+  v.flag("labels", o.labels);
+}
+
+void RenderSettings::check() const { check_fields(*this, "render"); }
+
+void read_settings(YamlReader yaml, RenderSettings& settings) {
+  read_fields(std::move(yaml), settings);
+}
+
+// "a.b=c" is the mapping {a: {b: c}}.
+void change_setting(const std::string& change, RenderSettings& settings) {
+  const std::size_t equals = change.find('=');
+  check(equals != std::string::npos && equals > 0, "'{}' is not a setting, expected path=value",
+        change);
+  std::string text = change.substr(equals + 1), path = change.substr(0, equals);
+  for (std::size_t dot = path.rfind('.'); dot != std::string::npos; dot = path.rfind('.')) {
+    text = "{" + path.substr(dot + 1) + ": " + text + "}";
+    path.resize(dot);
+  }
+  read_settings(YamlReader::from_text("{" + path + ": " + text + "}", change), settings);
+}
+
+std::string settings_json(const RenderSettings& settings) {
+  return json_of_fields(settings).dump();
+}
+
+}  // namespace rugae

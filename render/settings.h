@@ -1,0 +1,37 @@
+#pragma once
+// How frames are made from a scene, a camera and a path: every effect is one switch. In YAML the
+// sections are mappings (`sensor: {noise: false}`).
+
+#include <string>
+#include <vector>
+
+#include "core/yaml.h"
+
+namespace rugae {
+
+struct LensSettings {
+  bool vignetting = true;
+};
+
+struct SensorSettings {
+  bool noise = true;  // shot and read noise
+};
+
+struct RenderSettings {
+  LensSettings lens;
+  SensorSettings sensor;
+  bool labels = true;  // truth images
+  /// Throws Error naming the field, its value and its range.
+  void check() const;
+};
+
+/// Keeps what the mapping does not name. Throws Error with file, line and column.
+void read_settings(YamlReader yaml, RenderSettings& settings);
+
+/// One change by its path, such as "sensor.noise=false". Throws Error naming the change.
+void change_setting(const std::string& change, RenderSettings& settings);
+
+/// Every setting, as JSON.
+std::string settings_json(const RenderSettings& settings);
+
+}  // namespace rugae
