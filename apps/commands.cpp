@@ -10,6 +10,8 @@
 #include "core/presets.h"
 #include "core/progress.h"
 #include "dataset/check_dataset.h"
+#include "dataset/frame_sheet.h"
+#include "dataset/image_io.h"
 #include "dataset/observations.h"
 #include "recon/pipeline.h"
 #include "render/simulate.h"
@@ -211,6 +213,35 @@ void add_check(CLI::App& app, int& exit_code) {
     print(a->json,
           {{"problems", result.problems}, {"frames", result.frames}, {"files", result.files}},
           text);
+  });
+}
+
+void add_picture(CLI::App& app) {
+  struct Arguments {
+    std::vector<fs::path> datasets;
+    fs::path out;
+    int frame = 0, columns = 3, width = 400;
+    bool labels = false;
+  };
+  const auto a = std::make_shared<Arguments>();
+  CLI::App& command = *app.add_subcommand("picture", "Frames and their labels on one sheet");
+  command.add_option("datasets", a->datasets, "One or more datasets")->required();
+  command.add_option("--frame", a->frame, "Which frame")->capture_default_str();
+  command.add_option("--columns", a->columns, "Pictures side by side")->capture_default_str();
+  command.add_option("--width", a->width, "Of a picture, px")->capture_default_str();
+  command.add_flag("--labels", a->labels, "Every label as well as the frame");
+  command.add_option("--out", a->out, "The sheet, a PNG")->required();
+  command.callback([a] {
+    std::vector<SheetTile> tiles;
+    for (const fs::path& dataset : a->datasets) {
+      const fs::path folder = (dataset / "").parent_path();  // without a slash at the end
+      const std::string name = fmt::format("{}, frame {}", folder.filename().string(), a->frame);
+      tiles.push_back({name, read_image_bgr(DatasetLayout{dataset}.frame(a->frame))});
+      if (!a->labels) continue;
+      const std::vector<SheetTile> labels = label_tiles(dataset, a->frame);
+      tiles.insert(tiles.end(), labels.begin(), labels.end());
+    }
+    write_image(a->out, sheet(tiles, a->columns, a->width));
   });
 }
 

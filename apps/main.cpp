@@ -39,6 +39,7 @@ int main(int argc, char** argv) {
   rugae::add_evaluate(app);
   rugae::add_run(app, exit_code);
   rugae::add_check(app, exit_code);
+  rugae::add_picture(app);
   rugae::add_list(app);
   try {
     app.parse(argc, argv);

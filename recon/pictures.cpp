@@ -8,6 +8,7 @@
 
 #include "core/files.h"
 #include "core/units.h"
+#include "dataset/colours.h"
 #include "dataset/image_io.h"
 #include "recon/flow.h"
 #include "recon/keyframes.h"
@@ -45,6 +46,12 @@ fs::path stage(const fs::path& folder, const std::string& name) {
   return folder / name;
 }
 
+// Between the 2nd and the 98th percentile, so that one far corner does not take all colours.
+cv::Mat relief_picture(const cv::Mat& depth) {
+  const double low = quantile(depth, 0.02), high = quantile(depth, 0.98);
+  return depth_picture(depth, low, high);
+}
+
 std::string name_of(int frame) { return fmt::format("{:06}.png", frame); }
 
 cv::Mat gray_as_bgr(const cv::Mat& gray) {
@@ -62,49 +69,6 @@ std::vector<int> spread(int n, int count) {
     if (at < n && (which.empty() || which.back() != at)) which.push_back(at);
   }
   return which;
-}
-
-cv::Mat colour_of_flow(const cv::Mat& flow_px, double max_px) {
-  cv::Mat hsv(flow_px.size(), CV_8UC3);
-  for (int y = 0; y < flow_px.rows; ++y) {
-    for (int x = 0; x < flow_px.cols; ++x) {
-      const auto& f = flow_px.at<cv::Vec2f>(y, x);
-      const double length = std::hypot(f[0], f[1]);
-      if (!std::isfinite(length)) {
-        hsv.at<cv::Vec3b>(y, x) = {0, 0, 0};
-        continue;
-      }
-      const double hue = std::atan2(f[1], f[0]) / kPi * 90.0 + 90.0;  // OpenCV: 180 is a full turn
-      hsv.at<cv::Vec3b>(y, x) = {cv::saturate_cast<uchar>(std::fmod(hue, 180.0)),
-                                 cv::saturate_cast<uchar>(255.0 * length / max_px), 255};
-    }
-  }
-  return hue_to_bgr(hsv);
-}
-
-cv::Mat colour_of_depth(const cv::Mat& depth) {
-  std::vector<float> values;
-  for (int y = 0; y < depth.rows; ++y)
-    for (int x = 0; x < depth.cols; ++x)
-      if (std::isfinite(depth.at<float>(y, x))) values.push_back(depth.at<float>(y, x));
-  cv::Mat hsv(depth.size(), CV_8UC3, cv::Scalar::all(0));
-  if (values.empty()) return hsv;
-  const auto percentile = [&](double share) {
-    const auto at = values.begin() +
-                    static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
-  };
-  const float low = percentile(0.02), high = std::max(percentile(0.98), low + 1e-9f);
-  for (int y = 0; y < depth.rows; ++y) {
-    for (int x = 0; x < depth.cols; ++x) {
-      const float d = depth.at<float>(y, x);
-      if (!std::isfinite(d)) continue;
-      const float near = 1.0f - std::clamp((d - low) / (high - low), 0.0f, 1.0f);
-      hsv.at<cv::Vec3b>(y, x) = {cv::saturate_cast<uchar>(120.0f * (1.0f - near)), 210, 255};
-    }
-  }
-  return hue_to_bgr(hsv);
 }
 
 void draw_preprocess(const fs::path& folder, const FrameSource& frames,
@@ -140,7 +104,7 @@ void draw_pairs(const fs::path& folder, const FrameSource& frames,
       lengths.push_back((pair.moving_px[i] - pair.reference_px[i]).norm());
     double max_px = 1.0;
     for (const double length : lengths) max_px = std::max(max_px, length);
-    write_image(flow_folder / name, colour_of_flow(flow, max_px));
+    write_image(flow_folder / name, flow_picture(flow, max_px));
     cv::Mat drawn = gray_as_bgr(reference);
     for (std::size_t i = 0; i < lengths.size(); ++i) {
       cv::line(drawn, drawn_at(pair.reference_px[i]), drawn_at(pair.moving_px[i]),
@@ -185,7 +149,7 @@ void draw_mosaics(const fs::path& folder, const std::vector<Mosaic>& mosaics,
             mosaic.seams.at<int>(y, x) != mosaic.seams.at<int>(y - 1, x))
           drawn.at<cv::Vec3b>(y, x) = {0, 255, 255};
     write_image(seam_folder / name, drawn);
-    if (depths[m]) write_image(depth_folder / name, colour_of_depth(depths[m]->depth));
+    if (depths[m]) write_image(depth_folder / name, relief_picture(depths[m]->depth));
   }
 }
 

@@ -12,11 +12,6 @@
 
 namespace rugae {
 
-/// Flow as colour: direction as hue, length as saturation (full at `max_px`; NaN is black).
-cv::Mat colour_of_flow(const cv::Mat& flow_px, double max_px);
-/// Depth as colour between its 2nd and 98th percentile; NaN is black.
-cv::Mat colour_of_depth(const cv::Mat& depth);
-
 /// Writes into <folder>/<stage>; every function takes what the stage made and nothing else.
 /// preprocess: original, mask, inpainted and final picture of some frames, the vignetting gain.
 void draw_preprocess(const std::filesystem::path& folder, const FrameSource& frames,

@@ -22,8 +22,8 @@ EVERYTHING_BELOW = {"core", "cameras", "scenes", "trajectories", "dataset", "ren
 MAY_INCLUDE["studies"] = EVERYTHING_BELOW
 MAY_INCLUDE["apps"] = MAY_INCLUDE["python"] = EVERYTHING_BELOW | {"studies"}
 
-# Headers of observations and estimates; the rest of dataset/ knows the truth.
-RECON_MAY_SEE = {"dataset/observations.h", "dataset/estimate.h", "dataset/image_io.h"}
+# Headers of observations, estimates and images in memory; the rest of dataset/ knows the truth.
+RECON_MAY_SEE = {"dataset/observations.h", "dataset/estimate.h", "dataset/image_io.h", "dataset/colours.h"}
 EMBREE_ONLY_IN = {"render/raycaster.cpp", "render/raycaster.h"}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')

@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/check.h"
-#include "studies/colours.h"
+#include "dataset/colours.h"
 #include "studies/html.h"
 
 namespace rugae {

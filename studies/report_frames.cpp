@@ -7,7 +7,7 @@
 #include "core/check.h"
 #include "dataset/image_io.h"
 #include "dataset/layout.h"
-#include "studies/colours.h"
+#include "dataset/colours.h"
 #include "studies/html.h"
 #include "studies/report_parts.h"
 

@@ -7,7 +7,7 @@
 
 #include "core/check.h"
 #include "render/shaded_view.h"
-#include "studies/colours.h"
+#include "dataset/colours.h"
 #include "studies/html.h"
 #include "studies/plots.h"
 #include "studies/report_parts.h"

@@ -75,7 +75,7 @@ TEST_F(CommandLine, UnknownCommandsAndOptionsOfferTheNearest) {
   expect_refused("simualte",
                  "'simualte': no such command; did you mean 'simulate'?; known: simulate, "
                  "calibrate, reconstruct, "
-                 "evaluate, run, check, list");
+                 "evaluate, run, check, picture, list");
   expect_refused("simulate --camrea x --out y",
                  "simulate: unknown option '--camrea'; did you mean '--camera'?");
   expect_refused("simulate", "simulate: --out is required; see rugae simulate --help");

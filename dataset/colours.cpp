@@ -1,4 +1,4 @@
-#include "studies/colours.h"
+#include "dataset/colours.h"
 
 #include <algorithm>
 #include <array>
