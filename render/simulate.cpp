@@ -11,6 +11,7 @@
 #include "core/files.h"
 #include "core/units.h"
 #include "dataset/writer.h"
+#include "render/clearance.h"
 #include "render/exposure_log.h"
 #include "render/frame.h"
 #include "render/sensor.h"
@@ -39,10 +40,16 @@ int default_frames(const TrajectoryOptions& trajectory, const Camera& camera) {
 }
 
 Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajectory,
-               const Camera& camera, const TriangleMesh& wall) {
+               const Camera& camera, const Scene& scene) {
   const int frames = options.frames > 0 ? options.frames : default_frames(trajectory, camera);
-  const PlannedPath path = plan_path(wall, trajectory, options.seed);
-  return {sample_path(path, frames, camera.sensor.fps), path.length_mm(), path.min_clearance_mm()};
+  // a planned path keeps clear of wherever the wall may move; a given one is only checked
+  TrajectoryOptions at_rest = trajectory;
+  if (trajectory.file.empty()) at_rest.clearance_mm += scene.motion_reach_mm;
+  const PlannedPath path = plan_path(scene.wall, at_rest, options.seed);
+  PoseTrack track = sample_path(path, frames, camera.sensor.fps);
+  check_moving_clearance(scene, track, trajectory.clearance_mm,
+                         fmt::format("trajectory '{}'", trajectory.name));
+  return {std::move(track), path.length_mm(), path.min_clearance_mm()};
 }
 
 DatasetInfo info_of(const SimulateOptions& options, int frames) {
@@ -184,7 +191,7 @@ SimulateResult simulate(const SimulateOptions& options, const std::filesystem::p
   progress.end(fmt::format("{} triangles", scene.wall.triangles.size()));
 
   progress.begin("path");
-  const Path path = find_path(options, trajectory, camera, scene.wall);
+  const Path path = find_path(options, trajectory, camera, scene);
   const int frames = static_cast<int>(path.track.size());
   check(options.only_frame < frames, "only-frame is {}, but there are {} frames",
         options.only_frame, frames);

@@ -26,7 +26,7 @@ struct SimulateOptions {
 
 struct SimulateResult {
   int frames = 0, skipped = 0;  // skipped: found finished from an earlier run
-  double path_length_mm = 0.0, min_clearance_mm = 0.0;
+  double path_length_mm = 0.0, min_clearance_mm = 0.0;  // to the wall at rest
   // Processor seconds of all threads over the frame loop. Writing is what the system spends while
   // files are written; encoding the rest of that stage.
   double trace_s = 0.0, shade_s = 0.0, label_s = 0.0, sensor_s = 0.0, encode_s = 0.0, write_s = 0.0;

@@ -164,6 +164,12 @@ AxisPoint OrganAxis::locate(const Vec3& p) const {
   return result;
 }
 
+Vec3 OrganAxis::direction_to(double share) const {
+  const auto ball =
+      std::ranges::find_if(balls_, [&](const Ball& b) { return b.s_mm >= share * length_mm(); });
+  return (ball->centre - balls_.front().centre).normalized();
+}
+
 Eigen::AlignedBox3d OrganAxis::box() const {
   Eigen::AlignedBox3d box;
   for (const Ball& b : balls_) {

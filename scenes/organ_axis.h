@@ -41,6 +41,8 @@ class OrganAxis {
   double length_mm() const { return balls_.back().s_mm; }
   /// Arc length of the given node.
   double node_s_mm(std::size_t node) const { return node_s_mm_[node]; }
+  /// Unit direction from the axis' beginning to the point at that share of its length.
+  Vec3 direction_to(double share) const;
   Eigen::AlignedBox3d box() const;
 
  private:

@@ -6,7 +6,9 @@
 #include "core/check.h"
 #include "core/presets.h"
 #include "core/yaml.h"
+#include "scenes/deformation.h"
 #include "scenes/import.h"
+#include "scenes/long_axis.h"
 #include "scenes/stomach.h"
 
 namespace rugae {
@@ -25,6 +27,7 @@ struct SceneFile {
   ImportOptions import;
   std::filesystem::path mesh;
   MucosaOptions mucosa;
+  DeformationOptions deformation;
 };
 
 void read_relief(YamlReader yaml, ReliefOptions& relief, const std::string& where) {
@@ -80,9 +83,30 @@ SceneFile read_scene_file(const std::filesystem::path& file) {
   }
   if (auto mucosa = yaml.child("mucosa"))
     read_mucosa(*mucosa, scene.mucosa, file.string() + ": mucosa");
+  if (auto deformation = yaml.child("deformation")) {
+    read_deformation(*deformation, scene.deformation);
+    scene.deformation.check(file.string() + ": deformation");
+  }
   yaml.finish();
   scene.stomach.check(file.string());
   return scene;
+}
+
+// Along a stomach's own axis, or along the wall's longest way with a stomach's proportions.
+OrganMotion find_motion(const SceneFile& file, const TriangleMesh& wall) {
+  const DeformationOptions& options = file.deformation;
+  if (!options.peristalsis && !options.breathing) return {};
+  if (file.kind == Kind::procedural) {
+    const StomachShape shape(file.stomach.scale);
+    return make_motion(options, shape.peristalsis_zone(), shape.axis(), wall.vertices);
+  }
+  const OrganAxis axis = long_axis(wall);
+  const double length = axis.length_mm();
+  const PeristalsisZone zone{.rise_from_mm = 0.3 * length,
+                             .rise_to_mm = 0.7 * length,
+                             .fall_from_mm = 0.85 * length,
+                             .fall_to_mm = length};
+  return make_motion(options, zone, axis, wall.vertices);
 }
 
 bool is_mesh_file(const std::string& name_or_path) {
@@ -121,12 +145,14 @@ Scene load_scene(const SceneRequest& request) {
     wall.mesh = std::move(stomach.mesh);
     regions = std::move(stomach.regions);
   }
+  OrganMotion motion = find_motion(file, wall.mesh);
   Scene scene{.name = std::filesystem::path(request.name_or_path).stem().string(),
               .wall = std::move(wall.mesh),
               .rest_positions = {},
               .regions = std::move(regions),
               .mucosa = Mucosa(file.mucosa, request.seed),
-              .motion = {},
+              .motion = std::move(motion.motion),
+              .motion_reach_mm = motion.reach_mm,
               .seed = request.seed,
               .notes = std::move(wall.notes)};
   scene.rest_positions = scene.wall.vertices;

@@ -78,7 +78,8 @@ struct Scene {
                                      // deformation; what the mucosa is a function of
   std::vector<Region> regions;       // of the vertices
   Mucosa mucosa;
-  WallMotion motion;  // empty: the wall keeps still
+  WallMotion motion;             // empty: the wall keeps still
+  double motion_reach_mm = 0.0;  // no vertex is ever farther from its rest position
   std::uint64_t seed = 1;
   std::vector<std::string> notes;  // of an imported mesh: what was found and done, a line each
 };

@@ -119,6 +119,13 @@ FoldZone StomachShape::fold_zone() const {
   return zone;
 }
 
+PeristalsisZone StomachShape::peristalsis_zone() const {
+  return {.rise_from_mm = axis_.node_s_mm(kBodyNode - 1),
+          .rise_to_mm = axis_.node_s_mm(kAntrumNode),
+          .fall_from_mm = axis_.node_s_mm(kPylorusNode),
+          .fall_to_mm = axis_.node_s_mm(kDuodenumNode)};
+}
+
 Eigen::AlignedBox3d StomachShape::box() const { return axis_.box().merged(oesophagus_.box()); }
 
 double StomachShape::length_mm() const {

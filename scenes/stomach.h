@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "scenes/deformation.h"
 #include "scenes/relief.h"
 #include "scenes/scene.h"
 
@@ -25,6 +26,7 @@ class StomachShape {
   AxisPoint locate(const Vec3& p) const { return axis_.locate(p); }
   Region region(const Vec3& p, const AxisPoint& at) const;
   FoldZone fold_zone() const;
+  PeristalsisZone peristalsis_zone() const;
   const OrganAxis& axis() const { return axis_; }
   Eigen::AlignedBox3d box() const;
   /// From the top of the fundus to the pylorus along the axis.

@@ -12,6 +12,7 @@
 #include "core/files.h"
 #include "core/mesh_io.h"
 #include "core/presets.h"
+#include "self_intersection.h"
 
 namespace rugae {
 namespace {
@@ -115,11 +116,58 @@ TEST_F(SceneFiles, ThePresetIsAStomach) {
   expect_whole(scene);
   EXPECT_EQ(scene.name, "stomach");
   EXPECT_EQ(scene.rest_positions, scene.wall.vertices);
-  EXPECT_EQ(preset_names("scenes"), std::vector<std::string>{"stomach"});
-  EXPECT_EQ(error_of("stomch"),
-            "scene 'stomch': no such preset; did you mean 'stomach'?; known: stomach");
+  EXPECT_EQ(preset_names("scenes"), (std::vector<std::string>{"stomach", "stomach-moving"}));
+  EXPECT_EQ(
+      error_of("stomch"),
+      "scene 'stomch': no such preset; did you mean 'stomach'?; known: stomach, stomach-moving");
   EXPECT_EQ(error_of("stomach", "medum"),
             "resolution is 'medum', expected one of: coarse, medium, fine; did you mean 'medium'?");
+}
+
+TEST_F(SceneFiles, TheMovingPresetIsTheSameStomachInMotion) {
+  const Scene still = load("stomach"), moving = load("stomach-moving");
+  EXPECT_FALSE(still.motion);
+  EXPECT_EQ(still.motion_reach_mm, 0.0);
+  ASSERT_TRUE(moving.motion);
+  EXPECT_EQ(moving.wall.vertices, still.wall.vertices);  // at rest
+  EXPECT_EQ(moving.rest_positions, still.rest_positions);
+  std::vector<Vec3> now;
+  double most = 0.0;
+  for (const double time_s : {0.0, 3.3, 71.0}) {
+    moving.motion(time_s, now);
+    ASSERT_EQ(now.size(), moving.rest_positions.size());
+    for (std::size_t v = 0; v < now.size(); ++v)
+      most = std::max(most, (now[v] - moving.rest_positions[v]).norm());
+  }
+  EXPECT_TRUE(most >= 7.0 && most <= moving.motion_reach_mm) << most;
+  EXPECT_TRUE(moving.motion_reach_mm <= 9.01);  // 7 mm of a wave and half a sway of 4 mm
+}
+
+TEST_F(SceneFiles, AnImportedWallMovesAlongItsOwnLongAxis) {
+  write("tube.ply", tube(20.0, 200.0));
+  const Scene scene = load(write("tube.yaml", std::string("kind: mesh\nmesh: tube.ply\n"
+                                                          "with_relief: false\n"
+                                                          "deformation: {peristalsis: true}\n")));
+  ASSERT_TRUE(scene.motion);
+  TriangleMesh wall = scene.wall;
+  scene.motion(40.0, wall.vertices);
+  double least_mm = 1e9;
+  for (std::size_t v = 0; v < wall.vertices.size(); ++v)
+    if (std::abs(wall.vertices[v].z() - 100.0) < 70.0)
+      least_mm = std::min(least_mm, wall.vertices[v].head<2>().norm());
+  EXPECT_NEAR(least_mm, 20.0 - 7.0, 1.0);  // the axis found is off the tube's by less
+  EXPECT_EQ(self_intersections(wall), 0);
+}
+
+TEST_F(SceneFiles, ADeformationOutOfRangeIsNamedByLineAndColumn) {
+  EXPECT_EQ(error_of(write("a.yaml", std::string("deformation: {waves_per_minute: 30}\n"))),
+            path("a.yaml") + ":1:33: waves_per_minute is 30, expected 0.5 to 12");
+  EXPECT_EQ(error_of(write("b.yaml", std::string("deformation:\n  breathng: true\n"))),
+            path("b.yaml") + ":2:3: unknown key 'breathng'; did you mean 'breathing'?");
+  EXPECT_EQ(error_of(write("c.yaml", std::string("deformation: {width_mm: 40}\n"))),
+            path("c.yaml") +
+                ": deformation: width_mm is 40, expected at most 20.0 where waves are 44.0 mm "
+                "apart (speed_mm_s 2.2, waves_per_minute 3)");
 }
 
 TEST_F(SceneFiles, ResolutionsHaveTheTrianglesTheyPromise) {
