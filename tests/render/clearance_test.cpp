@@ -19,6 +19,7 @@ Scene sphere(const std::function<Vec3(double, const Vec3&)>& move, double reach_
               .rest_positions = {},
               .regions = {},
               .mucosa = Mucosa({}, 1),
+              .motion = {},
               .notes = {}};
   scene.rest_positions = scene.wall.vertices;
   scene.motion_reach_mm = reach_mm;
