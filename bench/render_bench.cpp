@@ -42,7 +42,7 @@ void primary_rays(benchmark::State& state) {
   const Stage& s = stage();
   const auto& rays = s.renderer.rays().directions_cam;
   std::vector<Hit> hits(rays.size());
-  for (auto _ : state) s.renderer.raycaster().intersect(s.pose.translation, rays, hits);
+  for (auto _ : state) s.renderer.wall().raycaster().intersect(s.pose.translation, rays, hits);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(rays.size()));
 }
 BENCHMARK(primary_rays)->Unit(benchmark::kMillisecond);
@@ -52,7 +52,7 @@ void primary_rays_one_by_one(benchmark::State& state) {
   const auto& rays = s.renderer.rays().directions_cam;
   for (auto _ : state)
     for (const Vec3& ray : rays)
-      benchmark::DoNotOptimize(s.renderer.raycaster().intersect(s.pose.translation, ray));
+      benchmark::DoNotOptimize(s.renderer.wall().raycaster().intersect(s.pose.translation, ray));
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(rays.size()));
 }
 BENCHMARK(primary_rays_one_by_one)->Unit(benchmark::kMillisecond);

@@ -67,7 +67,21 @@ Lens read_lens(YamlReader yaml, const std::string& place) {
   return lens;
 }
 
-Sensor read_sensor(YamlReader yaml) {
+// Rows are read within the frame's time. Where a file does not say, the readout takes all of it.
+void read_row_time(YamlReader& yaml, int height, Sensor& sensor) {
+  const double most_us = 1e6 / (sensor.fps * height);
+  if (sensor.shutter == Shutter::rolling) sensor.row_time_us = most_us;
+  if (!yaml.has("row_time_us")) return;
+  check(sensor.shutter == Shutter::rolling, "{}: row_time_us is given, but the shutter is global",
+        yaml.where("row_time_us"));
+  yaml.get("row_time_us", sensor.row_time_us);
+  check(
+      sensor.row_time_us > 0.0 && sensor.row_time_us <= most_us * (1.0 + 1e-12),
+      "{}: row_time_us is {}, expected above 0 and at most {:.6g} ({} rows at {} frames a second)",
+      yaml.where("row_time_us"), sensor.row_time_us, most_us, height, sensor.fps);
+}
+
+Sensor read_sensor(YamlReader yaml, int height) {
   Sensor sensor;
   yaml.require("pixel_pitch_um", sensor.pixel_pitch_um);
   yaml.require("fps", sensor.fps);
@@ -87,6 +101,7 @@ Sensor read_sensor(YamlReader yaml) {
         yaml.where("read_noise_e"), sensor.read_noise_e);
   check(sensor.bit_depth >= 8 && sensor.bit_depth <= 16, "{}: bit_depth is {}, expected 8 to 16",
         yaml.where("bit_depth"), sensor.bit_depth);
+  read_row_time(yaml, height, sensor);
   yaml.finish();
   return sensor;
 }
@@ -118,7 +133,7 @@ Camera load_camera(const std::string& name_or_path) {
   }
   const auto sensor = yaml.child("sensor");
   check(sensor.has_value(), "{}: key 'sensor' is missing", yaml.where("sensor"));
-  camera.sensor = read_sensor(*sensor);
+  camera.sensor = read_sensor(*sensor, camera.lens.height);
   yaml.finish();
   const double w = camera.lens.width, h = camera.lens.height;
   for (const Vec2& corner : {Vec2(0, 0), Vec2(w, 0), Vec2(0, h), Vec2(w, h)})
@@ -183,6 +198,7 @@ std::string camera_yaml(const Camera& camera) {
                       s.pixel_pitch_um, s.fps, s.bit_depth);
   text += fmt::format("  full_well_e: {:.17g}\n  read_noise_e: {:.17g}\n  shutter: {}\n",
                       s.full_well_e, s.read_noise_e, kShutters[static_cast<int>(s.shutter)]);
+  if (s.shutter == Shutter::rolling) text += fmt::format("  row_time_us: {:.17g}\n", s.row_time_us);
   return text;
 }
 

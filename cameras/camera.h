@@ -83,6 +83,7 @@ struct Sensor {
   double full_well_e = 0.0;   // electrons at saturation
   double read_noise_e = 0.0;  // standard deviation, electrons
   Shutter shutter = Shutter::global;
+  double row_time_us = 0.0;  // from a row to the next below; 0 for a global shutter
 };
 
 struct Camera {

@@ -32,6 +32,8 @@ enum FrameMask : unsigned char {
   kMaskSaturated = 4,      // a channel reached the top of the ADC
   kMaskFlowValid = 8,      // the wall point projects into frame t+1's image
   kMaskFlowOccluded = 16,  // ... but is hidden there by other wall
+  kMaskBackwardFlowValid = 32,     // the wall point projects into frame t-1's image
+  kMaskBackwardFlowOccluded = 64,  // ... but was hidden there by other wall
 };
 
 struct DatasetLayout {

@@ -19,6 +19,10 @@ struct FrameTruth {
   cv::Mat normal;    // CV_32FC3, unit, camera axes, facing the camera; NaN where nothing was hit
   cv::Mat flow_px;   // CV_32FC2, to the next frame; NaN where invalid; empty for the last frame
   cv::Mat masks;     // CV_8U, bits FrameMask
+  // On request, else empty:
+  cv::Mat backward_flow_px;  // CV_32FC2, to the frame before; empty for the first
+  cv::Mat triangle;  // CV_32FC3: index of the wall's triangle and the barycentric coordinates of
+                     // its second and third corner; NaN where nothing was hit
 };
 
 class Truth {

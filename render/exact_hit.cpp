@@ -16,17 +16,23 @@ constexpr double kSamePlace = 1e-12;
 }  // namespace
 
 ExactHit::ExactHit(const TriangleMesh& mesh)
-    : mesh_(&mesh), first_of_vertex_(mesh.vertices.size() + 1, 0) {
+    : triangles_(&mesh.triangles), vertices_{&mesh.vertices} {
+  auto around = std::make_shared<Around>();
+  std::vector<int>& first = around->first_of_vertex;
+  first.assign(mesh.vertices.size() + 1, 0);
   for (const Vec3i& t : mesh.triangles)
-    for (int k = 0; k < 3; ++k) ++first_of_vertex_[t[k] + 1];
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-    first_of_vertex_[v + 1] += first_of_vertex_[v];
-  triangles_of_vertex_.resize(3 * mesh.triangles.size());
-  std::vector<int> next(first_of_vertex_.begin(), first_of_vertex_.end() - 1);
+    for (int k = 0; k < 3; ++k) ++first[t[k] + 1];
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) first[v + 1] += first[v];
+  around->triangles_of_vertex.resize(3 * mesh.triangles.size());
+  std::vector<int> next(first.begin(), first.end() - 1);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
     for (int k = 0; k < 3; ++k)
-      triangles_of_vertex_[next[mesh.triangles[i][k]]++] = static_cast<int>(i);
+      around->triangles_of_vertex[next[mesh.triangles[i][k]]++] = static_cast<int>(i);
+  around_ = std::move(around);
 }
+
+ExactHit::ExactHit(const ExactHit& other, const VertexMotion& vertices)
+    : triangles_(other.triangles_), vertices_(vertices), around_(other.around_) {}
 
 // Corners are sheared into a frame in which the ray is the third axis, and the edge functions are
 // taken of the other two coordinates. A corner's coordinates do not depend on the triangle, and an
@@ -35,10 +41,11 @@ ExactHit::ExactHit(const TriangleMesh& mesh)
 // 2013).
 struct ExactHit::Ray {
   Vec3 origin;
+  double beat;
   int x, y, z;  // axes; z is the one along which the ray runs fastest
   double shear_x, shear_y, along;
 
-  Ray(const Vec3& o, const Vec3& direction) : origin(o) {
+  Ray(const Vec3& o, const Vec3& direction, double when) : origin(o), beat(when) {
     direction.cwiseAbs().maxCoeff(&z);
     x = z == 2 ? 0 : z + 1;
     y = x == 2 ? 0 : x + 1;
@@ -53,9 +60,9 @@ struct ExactHit::Ray {
 };
 
 ExactHit::Meeting ExactHit::meet(const Ray& ray, int triangle) const {
-  const Vec3i& t = mesh_->triangles[triangle];
-  const Vec3 a = ray(mesh_->vertices[t[0]]), b = ray(mesh_->vertices[t[1]]),
-             c = ray(mesh_->vertices[t[2]]);
+  const Vec3i& t = (*triangles_)[triangle];
+  const Vec3 a = ray(vertices_(t[0], ray.beat)), b = ray(vertices_(t[1], ray.beat)),
+             c = ray(vertices_(t[2], ray.beat));
   const double u = c.x() * b.y() - c.y() * b.x(), v = a.x() * c.y() - a.y() * c.x(),
                w = b.x() * a.y() - b.y() * a.x();
   const double inverse = 1.0 / (u + v + w);
@@ -63,9 +70,9 @@ ExactHit::Meeting ExactHit::meet(const Ray& ray, int triangle) const {
   return {(b0 * a.z() + b1 * b.z() + b2 * c.z()) * ray.along, b0, b1, b2};
 }
 
-Hit ExactHit::operator()(const Vec3& origin, const Vec3& direction, int proposed,
+Hit ExactHit::operator()(const Vec3& origin, const Vec3& direction, double beat, int proposed,
                          bool strictly) const {
-  const Ray ray(origin, direction);
+  const Ray ray(origin, direction, beat);
   const Meeting first = meet(ray, proposed);
   const auto as_hit = [](int triangle, const Meeting& m) {
     return Hit{triangle, m.range_mm, static_cast<float>(m.b1), static_cast<float>(m.b2)};
@@ -75,9 +82,9 @@ Hit ExactHit::operator()(const Vec3& origin, const Vec3& direction, int proposed
   int best = -1;
   Meeting best_meeting = first;
   for (int k = 0; k < 3; ++k) {
-    const int vertex = mesh_->triangles[proposed][k];
-    for (int i = first_of_vertex_[vertex]; i < first_of_vertex_[vertex + 1]; ++i) {
-      const int triangle = triangles_of_vertex_[i];
+    const int vertex = (*triangles_)[proposed][k];
+    for (int i = around_->first_of_vertex[vertex]; i < around_->first_of_vertex[vertex + 1]; ++i) {
+      const int triangle = around_->triangles_of_vertex[i];
       const Meeting m = meet(ray, triangle);
       // Written so that the not-a-number of a triangle seen edge-on is no hit.
       if (!(m.b0 >= 0.0 && m.b1 >= 0.0 && m.b2 >= 0.0 && m.range_mm > 0.0)) continue;
@@ -100,9 +107,9 @@ Hit ExactHit::nearest_on(const Ray& ray, int triangle, const Meeting& meeting) c
   Vec3 b(meeting.b0, meeting.b1, meeting.b2);
   b = b.allFinite() ? Vec3(b.cwiseMax(0.0)) : Vec3(1.0, 0.0, 0.0);  // seen edge-on: a corner
   b /= b.sum();
-  const Vec3i& t = mesh_->triangles[triangle];
+  const Vec3i& t = (*triangles_)[triangle];
   double along = 0.0;
-  for (int k = 0; k < 3; ++k) along += b[k] * ray(mesh_->vertices[t[k]]).z();
+  for (int k = 0; k < 3; ++k) along += b[k] * ray(vertices_(t[k], ray.beat)).z();
   return {triangle, along * ray.along, static_cast<float>(b[1]), static_cast<float>(b[2])};
 }
 

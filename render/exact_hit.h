@@ -2,9 +2,11 @@
 // Where a ray meets a triangle mesh, in double precision, given a triangle that a single-precision
 // traversal proposes.
 
+#include <memory>
 #include <vector>
 
 #include "core/mesh.h"
+#include "render/vertex_motion.h"
 
 namespace rugae {
 
@@ -23,11 +25,13 @@ struct Hit {
 class ExactHit {
  public:
   explicit ExactHit(const TriangleMesh& mesh);  // keeps a reference: the mesh must outlive it
+  /// The triangles of `other` with vertices that are elsewhere or move.
+  ExactHit(const ExactHit& other, const VertexMotion& vertices);
 
-  /// The hit of the ray origin + t direction (unit) at the proposed triangle or a neighbour. Where
-  /// the exact ray misses all of them, past an outline: the next point of the proposed triangle, or
-  /// no hit when `strictly`.
-  Hit operator()(const Vec3& origin, const Vec3& direction, int proposed,
+  /// The hit of the ray origin + t direction (unit), sent at `beat`, at the proposed triangle or a
+  /// neighbour. Where the exact ray misses all of them, past an outline: the next point of the
+  /// proposed triangle, or no hit when `strictly`.
+  Hit operator()(const Vec3& origin, const Vec3& direction, double beat, int proposed,
                  bool strictly = false) const;
 
  private:
@@ -36,11 +40,15 @@ class ExactHit {
     double range_mm;
     double b0, b1, b2;
   };
+  struct Around {  // the triangles around a vertex
+    std::vector<int> first_of_vertex, triangles_of_vertex;
+  };
   Meeting meet(const Ray& ray, int triangle) const;
   Hit nearest_on(const Ray& ray, int triangle, const Meeting& meeting) const;
 
-  const TriangleMesh* mesh_;
-  std::vector<int> first_of_vertex_, triangles_of_vertex_;  // the triangles around a vertex
+  const std::vector<Vec3i>* triangles_;
+  VertexMotion vertices_;
+  std::shared_ptr<const Around> around_;
 };
 
 }  // namespace rugae

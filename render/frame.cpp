@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <memory>
+#include <optional>
 
 #include "render/radiance.h"
 #include "render/thread_clock.h"
@@ -37,41 +38,46 @@ FrameRenderer::FrameRenderer(const Scene& scene, const Camera& camera, const Ren
     : FrameRenderer(Surface(scene), camera, options) {}
 
 FrameRenderer::FrameRenderer(Surface surface, const Camera& camera, const RenderOptions& options)
-    : surface_(std::move(surface)),
+    : wall_(std::move(surface)),
       camera_(camera),
       options_(options),
       rays_(make_ray_table(camera.lens, camera.vignetting)),
-      raycaster_(surface_.wall()),
       lens_(camera.lens) {}
 
-CleanFrame FrameRenderer::render(const Rigid3& world_from_camera, const Rigid3* next,
-                                 RenderTimes* times) const {
+CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous,
+                                 const FrameView* next, RenderTimes* times) const {
   CleanFrame frame;
   frame.radiance = cv::Mat(rays_.height, rays_.width, CV_32FC3, cv::Scalar::all(0.0));
   if (options_.labels)
-    frame.truth = empty_truth(rays_.width, rays_.height, next != nullptr);
+    frame.truth = empty_truth(rays_.width, rays_.height, previous != nullptr, next != nullptr,
+                              options_.choice);
   else
     frame.truth.masks = cv::Mat(rays_.height, rays_.width, CV_8U, cv::Scalar(0));
 
-  const Mat3 rotation = world_from_camera.rotation.toRotationMatrix();
+  const Wall& wall = wall_of(now);
+  std::optional<OtherFrame> before, after;
+  if (previous && options_.choice.backward_flow)
+    before.emplace(OtherFrame{*previous, wall_of(*previous)});
+  if (next) after.emplace(OtherFrame{*next, wall_of(*next)});
+  const LabelView view{wall, before ? &*before : nullptr, after ? &*after : nullptr};
+
+  const std::vector<Instant> instants = now.instants(rays_.height);
   const int columns = (rays_.width + kTileWidth - 1) / kTileWidth;
   const int rows = (rays_.height + kTileHeight - 1) / kTileHeight;
   tbb::parallel_for(tbb::blocked_range<int>(0, columns * rows, 4), [&](const auto& range) {
     const auto s = std::make_unique<Scratch>();
     for (int t = range.begin(); t < range.end(); ++t) {
       const double start = thread_seconds();
-      place_tile(rays_, rotation, t % columns * kTileWidth, t / columns * kTileHeight, s->tile);
+      place_tile(rays_, instants, t % columns * kTileWidth, t / columns * kTileHeight, s->tile);
       const auto n = static_cast<std::size_t>(s->tile.count);
-      raycaster_.intersect(world_from_camera.translation, {s->tile.direction_world.data(), n},
-                           {s->tile.hit.data(), n});
+      wall.raycaster().intersect(s->tile.eyes(), {s->tile.direction_world.data(), n},
+                                 {s->tile.hit.data(), n});
       const double traced = thread_seconds();
-      surface_.look_up(s->tile, rays_, s->surface);
+      wall.surface().look_up(s->tile, rays_, s->surface);
       shade(light_, s->tile, s->surface, s->radiance);
       store(*s, rays_, options_.vignetting, frame);
       const double shaded = thread_seconds();
-      if (options_.labels)
-        label_tile(s->tile, rays_, surface_, raycaster_, lens_, {world_from_camera, next},
-                   frame.truth);
+      if (options_.labels) label_tile(s->tile, rays_, lens_, view, frame.truth);
       if (times) {
         times->trace_s += traced - start;
         times->shade_s += shaded - traced;
@@ -80,6 +86,14 @@ CleanFrame FrameRenderer::render(const Rigid3& world_from_camera, const Rigid3* 
     }
   });
   return frame;
+}
+
+CleanFrame FrameRenderer::render(const Rigid3& world_from_camera, const Rigid3* next,
+                                 RenderTimes* times) const {
+  FrameView now, after;
+  now.camera = RowPoses(world_from_camera);
+  if (next) after.camera = RowPoses(*next);
+  return render(now, nullptr, next ? &after : nullptr, times);
 }
 
 }  // namespace rugae

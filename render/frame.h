@@ -7,7 +7,7 @@
 #include "dataset/truth.h"
 #include "render/labels.h"
 #include "render/light.h"
-#include "render/raycaster.h"
+#include "render/motion.h"
 #include "render/surface.h"
 
 namespace rugae {
@@ -20,6 +20,7 @@ struct RenderTimes {
 struct RenderOptions {
   bool vignetting = true;
   bool labels = true;
+  LabelChoice choice = {};  // of those that are not always there
 };
 
 struct CleanFrame {
@@ -35,20 +36,25 @@ class FrameRenderer {
   /// Any wall and material.
   FrameRenderer(Surface surface, const Camera& camera, const RenderOptions& options);
 
-  /// `next` is the following frame's pose, null for the last. Tiles are shared among the threads of
-  /// the caller's arena; the result does not depend on how.
+  /// The sharp frame: each row as it is in the middle of its exposure. `previous` and `next` are
+  /// the frames beside it, null where there is none. Tiles are shared among the threads of the
+  /// caller's arena; the result does not depend on how.
+  CleanFrame render(const FrameView& now, const FrameView* previous, const FrameView* next,
+                    RenderTimes* times = nullptr) const;
+  /// With a global shutter and a wall that keeps still.
   CleanFrame render(const Rigid3& world_from_camera, const Rigid3* next,
                     RenderTimes* times = nullptr) const;
 
   const RayTable& rays() const { return rays_; }
-  const Raycaster& raycaster() const { return raycaster_; }
+  const Wall& wall() const { return wall_; }  // at rest
 
  private:
-  Surface surface_;
+  const Wall& wall_of(const FrameView& view) const { return view.wall ? *view.wall : wall_; }
+
+  Wall wall_;
   Camera camera_;
   RenderOptions options_;
   RayTable rays_;
-  Raycaster raycaster_;
   LensProjector lens_;
   PointLight light_;
 };

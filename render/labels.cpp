@@ -4,67 +4,139 @@
 #include <limits>
 
 namespace rugae {
+namespace {
 
-FrameTruth empty_truth(int width, int height, bool has_next) {
+// What flow in either direction needs of a lane.
+struct Seen {
+  bool met;
+  Vec3 point_world;
+  double side;  // -1 where the wall's winding normal points away from the camera, 1 elsewhere
+};
+
+// Where a material point of this frame's wall is at a time of the other frame.
+class Follow {
+ public:
+  Follow(const Tile& tile, const Wall& wall, const OtherFrame& other)
+      : tile_(tile), wall_(wall), other_(other), still_(&wall == &other.wall) {}
+
+  Vec3 point(int lane, const Seen& seen, double offset_s) const {
+    if (still_) return seen.point_world;
+    const Hit& hit = tile_.hit[lane];
+    return seen.point_world + (other_.wall.point(hit, other_.view.beat(offset_s)) -
+                               wall_.point(hit, tile_.instant_of(lane).beat));
+  }
+
+ private:
+  const Tile& tile_;
+  const Wall& wall_;
+  const OtherFrame& other_;
+  bool still_;
+};
+
+struct FlowOut {
+  cv::Mat& flow_px;
+  unsigned char valid, occluded;  // bits of the mask
+};
+
+void label_flow(const Tile& tile, const RayTable& rays, const LensProjector& lens, const Wall& wall,
+                const OtherFrame& other, const Lanes<Seen>& seen, const FlowOut& out,
+                cv::Mat& masks) {
+  const Follow follow(tile, wall, other);
+  const RowPoses& camera = other.view.camera;
+  Rigid3 pose = camera.of_row(0);
+  Mat3 cam_from_world = pose.rotation.toRotationMatrix().transpose();  // rotation alone
+
+  // In a closed mesh a wall point turned away from the camera is hidden without tracing.
+  Lanes<Vec3> point_world;
+  Lanes<std::uint8_t> lands, faces, hidden;
+  Lanes<Eye> eyes;
+  if (!camera.rolling()) eyes[0] = {pose.translation, 0.0};
+  for (int lane = 0; lane < tile.count; ++lane) {
+    lands[lane] = faces[lane] = 0;
+    if (!seen[lane].met) continue;
+    const int i = tile.pixel[lane];
+    const Vec2 pixel(i % rays.width + 0.5, i / rays.width + 0.5);
+    const auto at = [&](double offset_s) { return follow.point(lane, seen[lane], offset_s); };
+    double offset_s = 0.0;
+    std::optional<Vec2> landing;
+    if (camera.rolling()) {
+      landing = camera.landing(lens, at, pixel.y());
+      if (!landing) continue;
+      pose = camera.at(landing->y());
+      offset_s = camera.offset_s(landing->y());
+      eyes[lane] = {pose.translation, other.view.beat(offset_s)};
+      point_world[lane] = at(offset_s);
+    } else {
+      point_world[lane] = at(0.0);
+      landing = lens.project(cam_from_world * (point_world[lane] - pose.translation));
+      if (!landing) continue;
+    }
+    if (landing->x() < 0.0 || landing->y() < 0.0 || landing->x() >= rays.width ||
+        landing->y() >= rays.height)
+      continue;
+    lands[lane] = 1;
+    const Vec3 normal = seen[lane].side * other.wall.geometric_normal(tile.hit[lane].triangle,
+                                                                      other.view.beat(offset_s));
+    faces[lane] = normal.dot(point_world[lane] - pose.translation) < 0.0;
+    out.flow_px.ptr<Vec2f>()[i] = (*landing - pixel).cast<float>();
+  }
+
+  const auto n = static_cast<std::size_t>(tile.count);
+  const std::span<const Eye> from(eyes.data(), camera.rolling() ? n : 1);
+  other.wall.raycaster().hidden_from(from, {point_world.data(), n}, {faces.data(), n},
+                                     {hidden.data(), n});
+  for (int lane = 0; lane < tile.count; ++lane) {
+    if (!lands[lane]) continue;
+    unsigned char& mask = masks.ptr<unsigned char>()[tile.pixel[lane]];
+    mask |= out.valid;
+    if (!faces[lane] || hidden[lane]) mask |= out.occluded;
+  }
+}
+
+}  // namespace
+
+FrameTruth empty_truth(int width, int height, bool has_previous, bool has_next,
+                       const LabelChoice& choice) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   FrameTruth truth;
   truth.depth_mm = cv::Mat(height, width, CV_32F, cv::Scalar(nan));
   truth.normal = cv::Mat(height, width, CV_32FC3, cv::Scalar::all(nan));
   if (has_next) truth.flow_px = cv::Mat(height, width, CV_32FC2, cv::Scalar::all(nan));
+  if (has_previous && choice.backward_flow)
+    truth.backward_flow_px = cv::Mat(height, width, CV_32FC2, cv::Scalar::all(nan));
+  if (choice.triangles) truth.triangle = cv::Mat(height, width, CV_32FC3, cv::Scalar::all(nan));
   truth.masks = cv::Mat(height, width, CV_8U, cv::Scalar(0));
   return truth;
 }
 
-void label_tile(const Tile& tile, const RayTable& rays, const Surface& surface,
-                const Raycaster& raycaster, const LensProjector& lens, const LabelView& view,
-                FrameTruth& truth) {
-  const Mat3 cam_from_world =
-      view.world_from_camera.rotation.toRotationMatrix().transpose();  // rotation alone
-  const Vec3 eye = view.world_from_camera.translation;
-  const Vec3 next_eye =
-      view.next_world_from_camera ? view.next_world_from_camera->translation : eye;
-  Mat3 next_rotation = Mat3::Identity();  // next camera from world
-  if (view.next_world_from_camera)
-    next_rotation = view.next_world_from_camera->rotation.toRotationMatrix().transpose();
-
-  // In a closed mesh a wall point turned away from the next camera is hidden without tracing.
-  Lanes<Vec3> point_world;
-  Lanes<std::uint8_t> lands, faces_next, hidden;
+void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& lens,
+                const LabelView& view, FrameTruth& truth) {
+  Lanes<Seen> seen;
   for (int lane = 0; lane < tile.count; ++lane) {
-    lands[lane] = faces_next[lane] = 0;
     const Hit& hit = tile.hit[lane];
+    seen[lane].met = hit.met();
     if (!hit.met()) continue;
     const int i = tile.pixel[lane];
-    const Vec3 ray_cam = rays.directions_cam[i];
-    truth.depth_mm.ptr<float>()[i] = static_cast<float>(hit.range_mm * ray_cam.z());
-    const Vec3 winding = surface.geometric_normal(hit.triangle).cast<double>();
-    const Vec3 normal = winding.dot(tile.direction_world[lane]) > 0.0 ? Vec3(-winding) : winding;
-    truth.normal.ptr<Vec3f>()[i] = (cam_from_world * normal).cast<float>();
+    const Instant& instant = tile.instant_of(lane);
+    const Vec3& ray_world = tile.direction_world[lane];
+    truth.depth_mm.ptr<float>()[i] = static_cast<float>(hit.range_mm * rays.directions_cam[i].z());
+    const Vec3 winding = view.wall.geometric_normal(hit.triangle, instant.beat);
+    const double side = winding.dot(ray_world) > 0.0 ? -1.0 : 1.0;
+    truth.normal.ptr<Vec3f>()[i] =
+        (instant.world_from_camera.transpose() * (side * winding)).cast<float>();
     truth.masks.ptr<unsigned char>()[i] |= kMaskValid;
-
-    if (!view.next_world_from_camera) continue;
-    point_world[lane] = eye + hit.range_mm * tile.direction_world[lane];
-    const Vec3 from_next = point_world[lane] - next_eye;
-    const auto landing = lens.project(next_rotation * from_next);
-    if (!landing || landing->x() < 0.0 || landing->y() < 0.0 || landing->x() >= rays.width ||
-        landing->y() >= rays.height)
-      continue;
-    lands[lane] = 1;
-    faces_next[lane] = normal.dot(from_next) < 0.0;
-    const Vec2 flow = *landing - Vec2(i % rays.width + 0.5, i / rays.width + 0.5);
-    truth.flow_px.ptr<Vec2f>()[i] = flow.cast<float>();
+    if (!truth.triangle.empty())
+      truth.triangle.ptr<Vec3f>()[i] = Vec3f(static_cast<float>(hit.triangle), hit.b1, hit.b2);
+    seen[lane].point_world = tile.eye_of(lane).position_mm + hit.range_mm * ray_world;
+    seen[lane].side = side;
   }
-  if (!view.next_world_from_camera) return;
-
-  const auto n = static_cast<std::size_t>(tile.count);
-  raycaster.hidden_from(next_eye, {point_world.data(), n}, {faces_next.data(), n},
-                        {hidden.data(), n});
-  for (int lane = 0; lane < tile.count; ++lane) {
-    if (!lands[lane]) continue;
-    unsigned char& mask = truth.masks.ptr<unsigned char>()[tile.pixel[lane]];
-    mask |= kMaskFlowValid;
-    if (!faces_next[lane] || hidden[lane]) mask |= kMaskFlowOccluded;
-  }
+  if (view.next)
+    label_flow(tile, rays, lens, view.wall, *view.next, seen,
+               {truth.flow_px, kMaskFlowValid, kMaskFlowOccluded}, truth.masks);
+  if (view.previous)
+    label_flow(tile, rays, lens, view.wall, *view.previous, seen,
+               {truth.backward_flow_px, kMaskBackwardFlowValid, kMaskBackwardFlowOccluded},
+               truth.masks);
 }
 
 }  // namespace rugae

@@ -2,25 +2,43 @@
 // Truth of a frame, worked out tile by tile from the exact hits.
 
 #include "dataset/truth.h"
-#include "render/raycaster.h"
-#include "render/surface.h"
+#include "render/motion.h"
+#include "render/tile.h"
 
 namespace rugae {
 
-/// Matrices of the frame's size, filled with "nothing was hit"; flow only when there is a next
-/// frame.
-FrameTruth empty_truth(int width, int height, bool has_next);
-
-struct LabelView {
-  Rigid3 world_from_camera;
-  const Rigid3* next_world_from_camera = nullptr;  // null for the last frame
+/// Labels that are there on request.
+struct LabelChoice {
+  bool backward_flow = false;
+  bool triangles = false;
 };
 
-/// Writes depth, normal, flow and the masks valid, flow valid and flow occluded of the tile's
-/// pixels. Occlusion is found by a ray from the next camera's centre to the wall point, not by
-/// comparing depths or triangles. Safe for different tiles at once.
-void label_tile(const Tile& tile, const RayTable& rays, const Surface& surface,
-                const Raycaster& raycaster, const LensProjector& lens, const LabelView& view,
-                FrameTruth& truth);
+/// Matrices of the frame's size, filled with "nothing was hit"; flow only where there is a frame to
+/// flow to.
+FrameTruth empty_truth(int width, int height, bool has_previous, bool has_next,
+                       const LabelChoice& choice);
+
+/// A frame beside the one that is labelled.
+struct OtherFrame {
+  const FrameView& view;
+  const Wall& wall;
+};
+
+struct LabelView {
+  const Wall& wall;
+  const OtherFrame* previous = nullptr;  // null: no flow to it
+  const OtherFrame* next = nullptr;
+};
+
+/// Writes depth, normal, flow, triangle and the masks valid, flow valid and flow occluded of the
+/// tile's pixels.
+///
+/// Flow leads to where the same material point (triangle and barycentric coordinates) lands in the
+/// other frame, at the time at which the row it lands in is exposed. It is occluded there when the
+/// wall at the point is turned away from the camera, or when a ray from the camera at that time to
+/// the point meets wall before Raycaster::kReach of the way; depths or triangles are not compared.
+/// Safe for different tiles at once.
+void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& lens,
+                const LabelView& view, FrameTruth& truth);
 
 }  // namespace rugae

@@ -28,6 +28,12 @@ Surface::Surface(const TriangleMesh& wall, Material material)
   pack(wall.vertices, {});
 }
 
+Surface::Surface(const Surface& rest, const TriangleMesh& moved)
+    : wall_(&moved), material_(rest.material_), vertices_(rest.vertices_) {
+  for (std::size_t i = 0; i < vertices_.size(); ++i) vertices_[i].normal = moved.normals[i];
+  find_triangle_normals();
+}
+
 void Surface::pack(const std::vector<Vec3>& rest_positions, const std::vector<Region>& regions) {
   const std::vector<Vec3f> normals =
       wall_->normals.empty() ? angle_weighted_normals(*wall_) : wall_->normals;
@@ -36,6 +42,10 @@ void Surface::pack(const std::vector<Vec3>& rest_positions, const std::vector<Re
     vertices_[i] = {normals[i],
                     (rest_positions.empty() ? wall_->vertices[i] : rest_positions[i]).cast<float>(),
                     regions.empty() ? Region::unknown : regions[i]};
+  find_triangle_normals();
+}
+
+void Surface::find_triangle_normals() {
   triangle_normals_.resize(wall_->triangles.size());
   for (std::size_t t = 0; t < triangle_normals_.size(); ++t)
     triangle_normals_[t] = triangle_normal(*wall_, t).cast<float>();

@@ -35,6 +35,8 @@ class Surface {
   explicit Surface(const Scene& scene);
   /// A wall of any material; rest positions are the vertices.
   Surface(const TriangleMesh& wall, Material material);
+  /// The wall of `rest` elsewhere: `moved` has the same triangles, and vertex normals.
+  Surface(const Surface& rest, const TriangleMesh& moved);
 
   const TriangleMesh& wall() const { return *wall_; }
   /// Unit geometric normal by the winding, world axes; zero for a triangle without area.
@@ -47,6 +49,7 @@ class Surface {
     Vec3f normal, rest_position_mm;
     Region region;
   };
+  void find_triangle_normals();
   void pack(const std::vector<Vec3>& rest_positions, const std::vector<Region>& regions);
 
   const TriangleMesh* wall_;

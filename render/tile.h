@@ -4,9 +4,10 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
-#include "render/exact_hit.h"
 #include "render/ray_table.h"
+#include "render/raycaster.h"
 
 namespace rugae {
 
@@ -16,16 +17,34 @@ inline constexpr int kTileSize = kTileWidth * kTileHeight;
 template <typename T>
 using Lanes = std::array<T, kTileSize>;
 
+/// The camera at the time of a ray.
+struct Instant {
+  Mat3 world_from_camera = Mat3::Identity();  // rotation alone
+  Vec3 camera_mm = Vec3::Zero();
+  double beat = 0.0;  // of the wall
+};
+
 struct Tile {
   int count = 0;     // lanes in use
   Lanes<int> pixel;  // index into the ray table, in 4 x 4 blocks so that packets stay together
+  std::span<const Instant> instants;
+  Lanes<int> instant;   // index into instants
+  bool one_eye = true;  // eye[0] is that of every lane
+  Lanes<Eye> eye;
   Lanes<Vec3> direction_world;
   Lanes<Hit> hit;
+
+  const Instant& instant_of(int lane) const {
+    return instants[static_cast<std::size_t>(instant[lane])];
+  }
+  const Eye& eye_of(int lane) const { return eye[one_eye ? 0 : lane]; }
+  std::span<const Eye> eyes() const {
+    return {eye.data(), one_eye ? 1 : static_cast<std::size_t>(count)};
+  }
 };
 
-/// Fills pixel and direction_world for the tile whose first pixel is (x0, y0).
-inline void place_tile(const RayTable& rays, const Mat3& world_from_camera, int x0, int y0,
-                       Tile& tile) {
+/// Fills the pixels of the tile whose first is (x0, y0).
+inline void place_pixels(const RayTable& rays, int x0, int y0, Tile& tile) {
   constexpr int kBlock = 4;
   const int x1 = std::min(x0 + kTileWidth, rays.width),
             y1 = std::min(y0 + kTileHeight, rays.height);
@@ -33,12 +52,24 @@ inline void place_tile(const RayTable& rays, const Mat3& world_from_camera, int 
   for (int yb = y0; yb < y1; yb += kBlock)
     for (int xb = x0; xb < x1; xb += kBlock)
       for (int y = yb; y < std::min(yb + kBlock, y1); ++y)
-        for (int x = xb; x < std::min(xb + kBlock, x1); ++x) {
-          const int i = y * rays.width + x;
-          tile.pixel[tile.count] = i;
-          tile.direction_world[tile.count] = world_from_camera * rays.directions_cam[i];
-          ++tile.count;
-        }
+        for (int x = xb; x < std::min(xb + kBlock, x1); ++x)
+          tile.pixel[tile.count++] = y * rays.width + x;
+}
+
+/// Fills the rays of the tile whose first pixel is (x0, y0): through the pixels' centres, at one
+/// instant for all of them or at one for each row.
+inline void place_tile(const RayTable& rays, std::span<const Instant> instants, int x0, int y0,
+                       Tile& tile) {
+  place_pixels(rays, x0, y0, tile);
+  tile.instants = instants;
+  tile.one_eye = instants.size() == 1;
+  for (int lane = 0; lane < tile.count; ++lane) {
+    const int i = tile.pixel[lane];
+    tile.instant[lane] = tile.one_eye ? 0 : i / rays.width;
+    const Instant& instant = tile.instant_of(lane);
+    tile.eye[lane] = {instant.camera_mm, instant.beat};
+    tile.direction_world[lane] = instant.world_from_camera * rays.directions_cam[i];
+  }
 }
 
 }  // namespace rugae

@@ -41,6 +41,17 @@ Rigid3 PlannedPath::world_from_camera(double fraction) const {
 double PlannedPath::length_mm() const { return impl_->length_mm; }
 double PlannedPath::min_clearance_mm() const { return impl_->min_clearance_mm; }
 
+Rigid3 sampled_pose(const PlannedPath& path, double fraction) {
+  // The last bits of a mathematics library's sines differ between processors; rounded poses do not.
+  const auto rounded = [](double value, int bits) {
+    return std::ldexp(std::nearbyint(std::ldexp(value, bits)), -bits);
+  };
+  Rigid3 pose = path.world_from_camera(fraction);
+  for (double& value : pose.translation) value = rounded(value, kPositionBits);
+  for (double& value : pose.rotation.coeffs()) value = rounded(value, kRotationBits);
+  return pose;
+}
+
 PoseTrack sample_path(const PlannedPath& path, int frames, double fps) {
   check(frames >= 2, "a path is sampled at {} frames, expected at least 2", frames);
   check(fps > 0.0 && std::isfinite(fps),
@@ -48,16 +59,7 @@ PoseTrack sample_path(const PlannedPath& path, int frames, double fps) {
         "than 0",
         fps);
   PoseTrack track(frames);
-  // The last bits of a mathematics library's sines differ between processors; rounded poses do not.
-  const auto rounded = [](double value, int bits) {
-    return std::ldexp(std::nearbyint(std::ldexp(value, bits)), -bits);
-  };
-  for (int i = 0; i < frames; ++i) {
-    Rigid3 pose = path.world_from_camera(i / (frames - 1.0));
-    for (double& value : pose.translation) value = rounded(value, kPositionBits);
-    for (double& value : pose.rotation.coeffs()) value = rounded(value, kRotationBits);
-    track[i] = {i / fps, pose};
-  }
+  for (int i = 0; i < frames; ++i) track[i] = {i / fps, sampled_pose(path, i / (frames - 1.0))};
   return track;
 }
 
