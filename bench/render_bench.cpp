@@ -1,9 +1,10 @@
 // What a frame costs, stage by stage, at 640 x 480: `bench_render --benchmark_counters_tabular`.
-// Peers side by side: the same primary rays through the ray tracing library's single rays.
+// Peers side by side: the same primary rays through Embree alone, and one by one.
 #include <benchmark/benchmark.h>
 
 #include <memory>
 
+#include "bare_embree.h"
 #include "render/frame.h"
 #include "render/sensor.h"
 #include "scenes/scene.h"
@@ -46,6 +47,16 @@ void primary_rays(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(rays.size()));
 }
 BENCHMARK(primary_rays)->Unit(benchmark::kMillisecond);
+
+// 100 % is what Embree's packets reach when nobody asks where in the triangle the ray landed.
+void bare_embree_packets(benchmark::State& state) {
+  const Stage& s = stage();
+  const auto& rays = s.renderer.rays().directions_cam;
+  bench::BareEmbree embree(s.scene.wall, s.pose.translation, rays);
+  for (auto _ : state) benchmark::DoNotOptimize(embree.trace());
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(rays.size()));
+}
+BENCHMARK(bare_embree_packets)->Unit(benchmark::kMillisecond);
 
 void primary_rays_one_by_one(benchmark::State& state) {
   const Stage& s = stage();
