@@ -60,6 +60,27 @@ TEST(Umeyama, NeverReflects) {
   const auto found = umeyama(source, target, true);
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->rotation.toRotationMatrix().determinant(), 1.0, kRounding);
+
+  // A turn cannot undo a reflection, but it is the best turn there is: any small change of it, with
+  // the translation that suits it best, leaves more.
+  const auto residual = [&](const Quat& rotation) {
+    Vec3 mean_source = Vec3::Zero(), mean_target = Vec3::Zero();
+    for (std::size_t i = 0; i < source.size(); ++i) {
+      mean_source += source[i] / static_cast<double>(source.size());
+      mean_target += target[i] / static_cast<double>(source.size());
+    }
+    double sum = 0.0;
+    for (std::size_t i = 0; i < source.size(); ++i)
+      sum += (found->scale * (rotation * (source[i] - mean_source)) - (target[i] - mean_target))
+                 .squaredNorm();
+    return sum;
+  };
+  const double best = residual(found->rotation);
+  for (int i = 0; i < 100; ++i) {
+    const auto n = random_normal(8, Purpose::test, 0, i);
+    const Quat change(Eigen::AngleAxisd(0.02 * n[3], Vec3(n[0], n[1], n[2]).normalized()));
+    EXPECT_TRUE(residual(change * found->rotation) >= best);
+  }
 }
 
 TEST(Umeyama, RefusesWhatDoesNotDetermineARotation) {

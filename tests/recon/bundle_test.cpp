@@ -116,6 +116,31 @@ TEST(Bundle, HoldsWhatIsNotFree) {
   }
 }
 
+// One camera fixes no world: the first placed key frame stays where it is, to the bit.
+TEST(Bundle, TheFirstPlacedKeyframeHoldsTheWorld) {
+  const synthetic::World world = synthetic::make_world({.cameras = 6, .noise_px = 0.5});
+  Structure s = true_structure(world);
+  s.placed[0] = false;
+  bundle_adjust(s, world.lens.fx, BundleOptions{}, {});
+  EXPECT_EQ(s.cam_from_world[1].translation, world.cam_from_world[1].translation);
+  EXPECT_EQ(s.cam_from_world[1].rotation.coeffs(), world.cam_from_world[1].rotation.coeffs());
+  EXPECT_NE(s.cam_from_world[2].translation, world.cam_from_world[2].translation);
+}
+
+TEST(Bundle, WhatIsNoInlierPullsNothing) {
+  const synthetic::World world = synthetic::make_world({.cameras = 8});
+  Structure s = true_structure(world);
+  for (std::size_t i = 0; i < s.tracks.size(); i += 3) {
+    auto& observation = s.tracks[i].observations.back();
+    observation.ray += Vec2(0.3, -0.2);
+    observation.inlier = false;
+  }
+  const BundleReport report = bundle_adjust(s, world.lens.fx, BundleOptions{}, {});
+  EXPECT_TRUE(report.final_cost <= 1e-12) << report.final_cost;  // rounding of exact tracks
+  const auto error = synthetic::path_error(s, world);
+  EXPECT_TRUE(error.rmse <= 1e-9 * error.path_extent) << error.rmse;
+}
+
 TEST(Bundle, SinglePoseIsFoundBack) {
   const synthetic::World world = synthetic::make_world({.cameras = 2});
   std::vector<Vec3> points;

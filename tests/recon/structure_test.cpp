@@ -216,5 +216,21 @@ TEST(Triangulation, ExactSightsMeetInThePoint) {
   EXPECT_FALSE(triangulate_robust({sights[0], sights[1]}, 0.003, 0.5).has_value());
 }
 
+// Two sights always agree on a point: two against two decide nothing.
+TEST(Triangulation, HalfOfTheSightsAreNotEnough) {
+  const Vec3 here(0.2, 0.1, 5.0), there(-0.9, 0.8, 4.0);
+  std::vector<Sight> sights;
+  for (int i = 0; i < 4; ++i) {
+    Sight sight;
+    sight.cam_from_world = Rigid3(Quat::Identity(), Vec3(-0.5 * i, 0.2 * (i % 3), 0.0));
+    const Vec3 p = sight.cam_from_world * (i < 2 ? here : there);
+    sight.ray = p.head<2>() / p.z();
+    sights.push_back(sight);
+  }
+  EXPECT_FALSE(triangulate_robust(sights, 0.003, 0.01).has_value());
+  sights.resize(3);
+  EXPECT_TRUE(triangulate_robust(sights, 0.003, 0.01).has_value());
+}
+
 }  // namespace
 }  // namespace rugae

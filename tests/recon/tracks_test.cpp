@@ -41,7 +41,8 @@ TEST(TrackChain, KeepsThePositionFollowedFromFurthestBack) {
   chain.add(1, {0}, {{110.5, 100.5}}, kSpacingPx);
   chain.add(2, {0}, {{120.5, 100.5}}, kSpacingPx);
   chain.starts(1, {}, kSpacingPx);
-  chain.add(2, {0}, {{121.0, 100.5}}, kSpacingPx);  // known from key frame 0 already
+  chain.add(2, {0}, {{127.5, 100.5}},
+            kSpacingPx);  // known from key frame 0 already, far enough to be another
   chain.add(3, {0}, {{130.5, 100.5}}, kSpacingPx);
   const auto tracks = chain.finish();
   ASSERT_EQ(tracks.size(), 1u);
