@@ -11,15 +11,13 @@
 #include "core/check.h"
 #include "core/files.h"
 #include "dataset/image_whole.h"
+#include "dataset/png_encode.h"
 
 namespace rugae {
 namespace fs = std::filesystem;
 namespace {
 
 constexpr int kJpegQuality = 95;
-// Deflate level 1 with run-length strategy: on rendered frames half the time of the default
-// strategy at level 3 and no larger, since sensor noise leaves nothing for longer matches to find.
-constexpr int kPngLevel = 1;
 
 std::string lower_extension(const fs::path& file) {
   std::string extension = file.extension().string();
@@ -61,9 +59,11 @@ void write_image(const fs::path& file, const cv::Mat& image) {
             (image.channels() == 1 || image.channels() == 3),
         "{}: image of type {}, expected 8-bit (PNG also 16-bit) with 1 or 3 channels",
         file.string(), cv::typeToString(image.type()));
-  std::vector<int> parameters{cv::IMWRITE_PNG_COMPRESSION, kPngLevel, cv::IMWRITE_PNG_STRATEGY,
-                              cv::IMWRITE_PNG_STRATEGY_RLE};
-  if (is_jpeg(extension)) parameters = {cv::IMWRITE_JPEG_QUALITY, kJpegQuality};
+  if (extension == ".png") {
+    write_atomic(file, encode_png(image));
+    return;
+  }
+  const std::vector<int> parameters = {cv::IMWRITE_JPEG_QUALITY, kJpegQuality};
   std::vector<unsigned char> bytes;
   bool encoded = false;
   std::string reason;

@@ -1,6 +1,6 @@
 #include "dataset/image_whole.h"
 
-#include <zlib.h>
+#include <libdeflate.h>
 
 #include <cstdint>
 
@@ -36,7 +36,7 @@ bool png_is_whole(const std::string& name, std::string_view bytes) {
     const std::size_t length = big_endian(bytes, at);
     if (length > bytes.size() - at - kFrame) return false;
     const std::string_view type = bytes.substr(at + 4, 4);
-    const auto crc = crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data() + at + 4), length + 4);
+    const auto crc = libdeflate_crc32(0, bytes.data() + at + 4, length + 4);
     check(crc == big_endian(bytes, at + 8 + length),
           "{}: damaged: the checksum of its {} chunk at byte {} does not match", name, type, at);
     if (type == "IEND") return true;
