@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/check.h"
 #include "core/random.h"
@@ -7,23 +8,24 @@
 #include "scenes/lattice_noise.h"
 #include "scenes/noise_tile.h"
 #include "scenes/portable_math.h"
+#include "scenes/region_tint.h"
 #include "scenes/scene.h"
 
 namespace rugae {
 namespace {
 
 // Sizes of the layers of detail, mm a lattice cell; a feature is about one and a half cells wide.
-constexpr float kBlotchMm = 23.0f;   // erythema, bile: colour over centimetres
-constexpr float kMottleMm = 5.3f;    // brightness over millimetres
-constexpr float kAreaMm = 2.3f;      // areae gastricae: 1 to 5 mm
-constexpr float kPatchMm = 1.3f;     // blotches within an area, and the wet layer's long ripples
-constexpr float kFoveolaMm = 0.42f;  // gastric pits: 0.2 to 0.5 mm apart, and the short ripples
-constexpr float kTreeMm = 8.0f;      // vessels of the submucosa
-constexpr float kTwigMm = 2.6f;      // vessels of the mucosa
-constexpr float kTreeHalfMm = 0.30f, kTwigHalfMm = 0.12f;  // half widths of the vessels
+constexpr float kBlotchMm = 23.0f;      // erythema, bile: colour over centimetres
+constexpr float kMottleMm = 5.3f;       // brightness over millimetres
+constexpr float kAreaMm = 2.7f;         // areae gastricae: 1 to 5 mm
+constexpr float kPatchMm = 1.3f;        // blotches within an area, and the wet layer's long ripples
+constexpr float kFoveolaMm = 0.42f;     // gastric pits: 0.2 to 0.5 mm apart, and the short ripples
+constexpr float kVesselMm = 9.0f;       // from vessel to vessel of the submucosa
+constexpr float kVesselHalfMm = 0.33f;  // half width, blurred by the mucosa above
 
-constexpr float kLongSlope = 0.13f, kShortSlope = 0.075f;  // of the wet layer, for a unit gradient
+constexpr float kLongSlope = 0.10f, kShortSlope = 0.075f;  // of the wet layer, for a unit gradient
 constexpr float kGradientMeanSquare = 0.50f;               // of a tile's gradient, per component
+constexpr float kFilmAlpha = 0.065f, kOilAlpha = 0.04f;   // GGX roughness of mucus and of oil
 constexpr float kWaterF0 = 0.0207f;                        // ((n - 1) / (n + 1))^2 with n = 1.336
 constexpr float kOilF0 = 0.0362f;                          // n = 1.47
 
@@ -70,8 +72,9 @@ void MucosaOptions::check(const std::string& where) const {
   share("oil", oil);
 }
 
-Mucosa::Mucosa(const MucosaOptions& options, std::uint64_t seed)
-    : options_(options), base_albedo_(options.base_albedo.cast<float>()) {
+Mucosa::Mucosa(const MucosaOptions& options, std::uint64_t seed,
+               std::shared_ptr<const RegionTint> tint)
+    : options_(options), base_albedo_(options.base_albedo.cast<float>()), tint_(std::move(tint)) {
   options.check("mucosa");
   const auto words = random_words(seed, Purpose::scene_mucosa, 0, 0);
   const auto smooth = [&](const Vec3& p) -> NoiseTile::Channels {
@@ -105,88 +108,93 @@ MucosaSample Mucosa::sample(const Vec3f& rest_position_mm, const Vec3f& normal, 
   const Lanes warp = blotch * splat(1.5f);
   const Lanes mottle = cells.fetch((pb + warp) * splat(1.0f / kMottleMm));
   const float blotch_tone = lane<3>(blotch), mottle_tone = lane<2>(mottle);
+  const Lanes tint = tint_ ? tint_->fetch(p) : lanes(1.0f, 1.0f, 1.0f, 0.5f);
 
   // Furrows and tones: `blood` reddens (haemoglobin takes green and blue), `shade` darkens.
   const float contrast = static_cast<float>(options_.mottle_contrast);
-  float blood = 0.9f * blotch_tone + 0.7f * mottle_tone;
-  float shade = 0.8f * lane<3>(mottle);
+  float blood = 1.5f * blotch_tone + 0.8f * mottle_tone;
+  float shade = 0.5f * lane<3>(mottle);
   Lanes slope = _mm_setzero_ps();
-  float lost_slope = 0.0f;
+  float lost_slope = 0.0f, breaks = 0.0f;
 
   const float area_share = survives(footprint_mm * (1.0f / kAreaMm));
   if (area_share > 0.0f) {
     const Lanes area = cells.fetch((p + warp) * splat(1.0f / kAreaMm));
-    blood += area_share * (0.7f * lane<0>(area) + 0.35f * lane<1>(area));
-    shade += area_share * (0.25f * lane<0>(area) + 0.3f * lane<2>(area));
+    blood += area_share * (0.4f * lane<0>(area) + 0.25f * lane<1>(area));
+    shade += area_share * (0.12f * lane<0>(area) + 0.2f * lane<2>(area));
   }
   const float patch_share = survives(footprint_mm * (1.0f / kPatchMm));
   if (patch_share > 0.0f) {
     const Lanes patch = smooth.fetch((pb - warp) * splat(1.0f / kPatchMm));
-    shade += 0.5f * patch_share * lane<3>(patch);
+    shade += 0.25f * patch_share * lane<3>(patch);
+    breaks = patch_share * lane<3>(patch);
     slope = turn.inverse_b * patch * splat(kLongSlope * patch_share);
   }
   lost_slope += kLongSlope * kLongSlope * (1.0f - patch_share * patch_share);
   const float pit_share = survives(footprint_mm * (1.0f / kFoveolaMm));
   if (pit_share > 0.0f) {
     const Lanes pit = smooth.fetch((pa + warp) * splat(1.0f / kFoveolaMm));
-    shade += 0.6f * pit_share * lane<3>(pit);
-    blood += 0.3f * pit_share * lane<3>(pit);
+    shade += 0.4f * pit_share * lane<3>(pit);
+    blood += 0.2f * pit_share * lane<3>(pit);
     slope = slope + turn.inverse_a * pit * splat(kShortSlope * pit_share);
   }
   lost_slope += kShortSlope * kShortSlope * (1.0f - pit_share * pit_share);
 
-  // Vessels run where a noise crosses zero; the distance to the line is |n| / |grad n| along the
-  // wall. Each layer fades in and out over the wall, as vessels dive.
-  const auto vessel = [&](float value, Lanes gradient, float cell_mm, float half_mm, float depth) {
-    const Lanes along = tangential(gradient, n);
-    const float steep = std::sqrt(lane<0>(dot3(along, along)) + 0.02f);
-    // a line narrower than the pixel keeps its darkness times width
-    const float half = std::max(half_mm, 0.5f * footprint_mm);
-    const float t = 1.0f - std::abs(value) * cell_mm / (1.6f * half * steep);
-    if (t <= 0.0f) return 0.0f;
-    // closed loops, where the noise barely crosses zero, fade: vessels do not end in rings
-    const float drawn = smooth_step(0.4f, 0.9f, steep);
-    return drawn * depth * (half_mm / half) * t * t * (3.0f - 2.0f * t);
-  };
-  const float tree_depth = std::min(0.35f + 0.9f * lane<0>(blotch), 1.0f);
+  // Vessels of the submucosa run where the largest of three fields (two noises and 0) changes
+  // hands: lines that meet by threes, as branches do. The distance to such a line is difference /
+  // |gradient of the difference| along the wall. They fade in and out over the wall, as they dive.
   float vessels = 0.0f;
-  if (tree_depth > 0.0f) {
-    // stretched along z: vessels keep a course
-    const Lanes stretch = lanes(1.0f, 1.0f, 0.45f);
-    const Lanes tree = smooth.fetch((p + warp * splat(0.6f)) * stretch * splat(1.0f / kTreeMm));
-    vessels += vessel(lane<3>(tree), tree * stretch, kTreeMm, kTreeHalfMm, tree_depth);
-  }
-  const float twig_depth =
-      std::min(0.4f + 0.8f * mottle_tone, 1.0f) * survives(footprint_mm * (1.0f / kTwigMm));
-  if (twig_depth > 0.0f) {
-    const Lanes twig = smooth.fetch((pa - warp * splat(0.4f)) * splat(1.0f / kTwigMm));
-    vessels +=
-        0.7f * vessel(lane<3>(twig), turn.inverse_a * twig, kTwigMm, kTwigHalfMm, twig_depth);
+  const float shown = lane<3>(tint) * std::clamp(0.35f + 1.2f * lane<0>(blotch), 0.0f, 1.0f);
+  if (shown > 0.0f) {
+    const Lanes bend = warp * splat(0.8f);
+    const Lanes first = smooth.fetch((p + bend) * splat(1.0f / kVesselMm));
+    const Lanes second = smooth.fetch((pb - bend) * splat(1.0f / kVesselMm));
+    float high = lane<3>(first), low = lane<3>(second);
+    Lanes high_slope = first, low_slope = turn.inverse_b * second;
+    if (high < low) {
+      std::swap(high, low);
+      std::swap(high_slope, low_slope);
+    }
+    if (high < 0.0f) {
+      low = std::exchange(high, 0.0f);
+      low_slope = std::exchange(high_slope, _mm_setzero_ps());
+    } else if (low < 0.0f) {
+      low = 0.0f;
+      low_slope = _mm_setzero_ps();
+    }
+    const Lanes across = tangential(high_slope - low_slope, n);
+    const float steep = std::sqrt(lane<0>(dot3(across, across)) + 0.02f);
+    // a line narrower than the pixel keeps its darkness times width
+    const float half = std::max(kVesselHalfMm, 0.5f * footprint_mm);
+    const float t = 1.0f - (high - low) * kVesselMm / (2.5f * half * steep);
+    // where the fields barely part, a vessel would be a blot
+    if (t > 0.0f)
+      vessels = shown * smooth_step(0.3f, 0.9f, steep) * (kVesselHalfMm / half) * t * t * t;
   }
 
   // Absorption acts on each colour; the limits keep the albedo inside (0, 1) at any contrast.
   MucosaSample out;
-  blood = contrast * blood + 2.2f * static_cast<float>(options_.vessel_contrast) * vessels;
+  blood = contrast * blood + static_cast<float>(options_.vessel_contrast) * vessels;
   shade *= contrast;
-  const float ochre = 0.35f * contrast * lane<1>(blotch);
+  const float ochre = 0.5f * contrast * lane<1>(blotch);
   const Lanes toned = splat(1.0f) - splat(blood) * lanes(0.16f, 0.55f, 0.50f) -
                       splat(shade) * lanes(0.8f, 0.9f, 0.95f) +
                       splat(ochre) * lanes(0.0f, 0.2f, -0.8f);
-  Lanes albedo = lanes(base_albedo_);
+  Lanes albedo = lanes(base_albedo_) * tint;
   if (region == Region::oesophagus)  // squamous, paler than gastric mucosa
     albedo = albedo * splat(0.8f) + lanes(0.16f, 0.10f, 0.07f);
   out.albedo = vec3(_mm_min_ps(_mm_max_ps(albedo * toned, splat(0.01f)), splat(0.95f)));
 
   // The wet layer: a film with holes, rippled; oil closes the holes and smooths the ripples.
-  const float film =
-      static_cast<float>(options_.wetness) + 0.5f * mottle_tone + 0.35f * lane<2>(blotch);
+  const float film = static_cast<float>(options_.wetness) - 0.32f + 1.4f * mottle_tone +
+                     0.9f * lane<2>(blotch) + 1.2f * breaks;
   const float water = std::clamp(film, 0.0f, 1.0f);
   const float oily = static_cast<float>(options_.oil) *
                      std::clamp(0.75f + 0.8f * lane<3>(mottle) + 0.4f * blotch_tone, 0.0f, 1.0f);
   const float calm = 1.0f - 0.75f * oily;
   out.coverage = water + (1.0f - water) * oily;
   out.f0 = kWaterF0 + (kOilF0 - kWaterF0) * oily;
-  const float alpha = 0.11f - 0.06f * oily;
+  const float alpha = kFilmAlpha + (kOilAlpha - kFilmAlpha) * oily;
   // Ripples finer than the pixel act as roughness: alpha^2 = alpha_0^2 + 2 sigma^2 of the slopes
   // lost (Olano and Baker, LEAN mapping, I3D 2010, doi:10.1145/1730804.1730834).
   out.roughness = std::sqrt(alpha * alpha + 2.0f * kGradientMeanSquare * lost_slope * calm * calm);

@@ -13,7 +13,7 @@ namespace {
 
 // Lengths below are in units of the spacing of folds: kernels reach so far across the folds and
 // along them, and stand so far apart. A fold keeps its course over about the reach along.
-constexpr double kReachAcross = 2.2, kReachAlong = 3.6, kKernelStep = 1.5;
+constexpr double kReachAcross = 2.2, kReachAlong = 4.4, kKernelStep = 1.5;
 constexpr double kMeanderRad = 0.9;  // of the direction, for a noise of one
 constexpr double kMeanderLengthMm = 45.0;
 constexpr double kWaveMm = 3.0, kWaveLengthMm = 17.0;  // the short bends of each fold
@@ -148,7 +148,7 @@ double Relief::rugae_mm(const Vec3& p, const AxisPoint& at) const {
   if (distance >= w) return 0.0;
   const double t = 1.0 - (distance / w) * (distance / w);
   // where the sum is small against what random phases give, the crests part or end: low there
-  const double drawn = smooth_step(0.1, 0.6, size / std::sqrt(total));
+  const double drawn = smooth_step(0.15, 1.2, size / std::sqrt(total));
   const NoiseSample height = gradient_noise(p / 19.0, vary_seed_ + 1);
   return options_.rugae_height_mm * share * drawn * std::min(1.0, 0.85 + 0.4 * height.value) * t *
          t;

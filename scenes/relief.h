@@ -15,7 +15,7 @@ struct ReliefOptions {
   double rugae_thickness_mm = 4.0;  // at half height; folds are 3 to 5 mm thick
   double rugae_spacing_mm = 11.0;   // from fold to fold, on the greater curvature of the body
   double areae_size_mm = 3.0;       // areae gastricae: 1 to 5 mm
-  double areae_depth_mm = 0.10;     // of the furrows between them; 0: none
+  double areae_depth_mm = 0.06;     // of the furrows between them; 0: none
   void check(const std::string& where) const;
 };
 

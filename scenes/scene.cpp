@@ -9,6 +9,7 @@
 #include "scenes/deformation.h"
 #include "scenes/import.h"
 #include "scenes/long_axis.h"
+#include "scenes/region_tint.h"
 #include "scenes/stomach.h"
 
 namespace rugae {
@@ -136,6 +137,7 @@ Scene load_scene(const SceneRequest& request) {
   file.mucosa.oil = std::max(file.mucosa.oil, request.oil);
   ImportedWall wall;
   std::vector<Region> regions;
+  std::shared_ptr<const RegionTint> tint;
   if (file.kind == Kind::mesh) {
     wall = import_wall(file.mesh, file.import, request.seed, level);
     regions.assign(wall.mesh.vertices.size(), Region::unknown);
@@ -144,13 +146,16 @@ Scene load_scene(const SceneRequest& request) {
         make_stomach(file.stomach, request.seed, kCellMm[level] * file.stomach.scale);
     wall.mesh = std::move(stomach.mesh);
     regions = std::move(stomach.regions);
+    const StomachShape shape(file.stomach.scale);
+    tint = std::make_shared<RegionTint>(
+        shape.box(), [&](const Vec3& p) { return shape.region(p, shape.locate(p)); });
   }
   OrganMotion motion = find_motion(file, wall.mesh);
   Scene scene{.name = std::filesystem::path(request.name_or_path).stem().string(),
               .wall = std::move(wall.mesh),
               .rest_positions = {},
               .regions = std::move(regions),
-              .mucosa = Mucosa(file.mucosa, request.seed),
+              .mucosa = Mucosa(file.mucosa, request.seed, std::move(tint)),
               .motion = std::move(motion.motion),
               .motion_reach_mm = motion.reach_mm,
               .seed = request.seed,

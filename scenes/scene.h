@@ -48,11 +48,15 @@ struct MucosaOptions {
   void check(const std::string& where) const;
 };
 
+class RegionTint;
+
 /// The mucosa as a pure function of the rest position, so that no UV map is needed and deformation
 /// carries it along. Copies share their noise tiles; sampling is safe from many threads at once.
 class Mucosa {
  public:
-  Mucosa(const MucosaOptions& options, std::uint64_t seed);
+  /// Without a tint every region has the colour of the body (the oesophagus' pale one apart).
+  Mucosa(const MucosaOptions& options, std::uint64_t seed,
+         std::shared_ptr<const RegionTint> tint = nullptr);
   /// `normal` is the wall's unit normal at rest, of either side. `footprint_mm` is the width of a
   /// pixel on the wall: detail finer than twice that is faded out, and the slopes that faded go
   /// into the roughness.
@@ -64,6 +68,7 @@ class Mucosa {
   MucosaOptions options_;
   Vec3f base_albedo_;
   std::shared_ptr<const Tiles> tiles_;
+  std::shared_ptr<const RegionTint> tint_;
 };
 
 /// Moves the wall: fills `vertices_mm` with where the wall's vertices are at `time_s` (seconds

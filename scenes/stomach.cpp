@@ -31,12 +31,12 @@ constexpr Station kAxis[] = {
     {-50, -11, -86, 28.5},  // 8
     {-66, -9, -72, 20},     // 9
     {-76, -6, -59, 9},      // 10 pyloric canal
-    {-82, -4, -49, 7},      // 11
-    {-88, -2, -41, 9},      // 12 first centimetres of the duodenum, a blind stub
-    {-93, 0, -34, 10},      // 13
+    {-82, -4, -49, 6},      // 11
+    {-89, 1, -41, 8},       // 12 first centimetres of the duodenum, a blind stub that turns back
+    {-94, 14, -37, 9},      // 13
 };
 constexpr Station kOesophagus[] = {
-    {0, 6, 12, 10}, {-18, 6, 30, 9.5}, {-29, 6, 44, 9}, {-36, 6, 58, 9}};
+    {0, 6, 12, 9}, {-19, 6, 29, 5.5}, {-29, 9, 43, 4.5}, {-33, 20, 55, 4.5}};  // nearly closed
 constexpr std::size_t kCardiaNode = 2, kBodyNode = 4, kIncisuraNode = 6, kAntrumNode = 7,
                       kPylorusNode = 10, kDuodenumNode = 12;
 constexpr double kFlattening = 0.92;  // front to back, of a distended stomach; assumed
@@ -91,7 +91,7 @@ double StomachShape::distance_mm(const Vec3& p, Vec3* gradient) const {
   const double d0 = axis_.distance_mm(p, gradient ? &g0 : nullptr);
   const double d1 = oesophagus_.distance_mm(p, gradient ? &g1 : nullptr);
   // smooth minimum of the two: -k ln(exp(-d0/k) + exp(-d1/k))
-  const double k = 3.0 * scale_, least = std::min(d0, d1);
+  const double k = 5.0 * scale_, least = std::min(d0, d1);
   const double w0 = portable_exp((least - d0) / k), w1 = portable_exp((least - d1) / k);
   if (gradient) *gradient = (w0 * g0 + w1 * g1) / (w0 + w1);
   return least - k * portable_log(w0 + w1);
