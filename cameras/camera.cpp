@@ -81,6 +81,21 @@ void read_row_time(YamlReader& yaml, int height, Sensor& sensor) {
       yaml.where("row_time_us"), sensor.row_time_us, most_us, height, sensor.fps);
 }
 
+void read_fixed_pattern(YamlReader& yaml, Sensor& sensor) {
+  yaml.get("prnu", sensor.prnu);
+  yaml.get("dsnu_e", sensor.dsnu_e);
+  yaml.get("black_level", sensor.black_level);
+  check(sensor.prnu >= 0.0 && sensor.prnu <= 0.2, "{}: prnu is {}, expected 0 to 0.2",
+        yaml.where("prnu"), sensor.prnu);
+  check(sensor.dsnu_e >= 0.0 && sensor.dsnu_e <= sensor.full_well_e,
+        "{}: dsnu_e is {}, expected 0 to the full well's {}", yaml.where("dsnu_e"), sensor.dsnu_e,
+        sensor.full_well_e);
+  const int half = 1 << (sensor.bit_depth - 1);
+  check(sensor.black_level >= 0 && sensor.black_level <= half,
+        "{}: black_level is {}, expected 0 to {}", yaml.where("black_level"), sensor.black_level,
+        half);
+}
+
 Sensor read_sensor(YamlReader yaml, int height) {
   Sensor sensor;
   yaml.require("pixel_pitch_um", sensor.pixel_pitch_um);
@@ -102,6 +117,7 @@ Sensor read_sensor(YamlReader yaml, int height) {
   check(sensor.bit_depth >= 8 && sensor.bit_depth <= 16, "{}: bit_depth is {}, expected 8 to 16",
         yaml.where("bit_depth"), sensor.bit_depth);
   read_row_time(yaml, height, sensor);
+  read_fixed_pattern(yaml, sensor);
   yaml.finish();
   return sensor;
 }
@@ -199,6 +215,8 @@ std::string camera_yaml(const Camera& camera) {
   text += fmt::format("  full_well_e: {:.17g}\n  read_noise_e: {:.17g}\n  shutter: {}\n",
                       s.full_well_e, s.read_noise_e, kShutters[static_cast<int>(s.shutter)]);
   if (s.shutter == Shutter::rolling) text += fmt::format("  row_time_us: {:.17g}\n", s.row_time_us);
+  text += fmt::format("  prnu: {:.17g}\n  dsnu_e: {:.17g}\n  black_level: {}\n", s.prnu, s.dsnu_e,
+                      s.black_level);
   return text;
 }
 

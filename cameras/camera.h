@@ -84,6 +84,9 @@ struct Sensor {
   double read_noise_e = 0.0;  // standard deviation, electrons
   Shutter shutter = Shutter::global;
   double row_time_us = 0.0;  // from a row to the next below; 0 for a global shutter
+  double prnu = 0.0;         // standard deviation of the pixels' gains, as a share
+  double dsnu_e = 0.0;       // standard deviation of the pixels' offsets, electrons
+  int black_level = 0;       // the converter's number of no light
 };
 
 struct Camera {

@@ -1,26 +1,22 @@
 #pragma once
-// From light to bytes: exposure, electrons with their noise, the ADC, the display curve.
+// From light to bytes: electrons with their noise and fixed patterns, the ADC, the picture.
 
 #include <array>
 #include <atomic>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
-#include <vector>
 
 #include "cameras/camera.h"
+#include "render/metering.h"
 #include "render/noise.h"
 
 namespace rugae {
 
 struct SensorOptions {
-  bool noise = true;
+  SensorSettings chain;
   double read_noise_factor = 1.0;  // added sensor noise: the read noise times this
   std::uint64_t seed = 1;
-};
-
-struct Exposure {
-  double time_s = 0.0;
-  double gain = 1.0;  // analogue, before the ADC: full scale is full well / gain
+  std::uint32_t camera = 0;  // cameras of one seed have noise and patterns of their own
 };
 
 /// Electrons of a pixel: Poisson of the mean, plus normal read noise.
@@ -47,45 +43,48 @@ class ElectronNoise {
   PoissonTable poisson_;
 };
 
+/// What a frame becomes; empty what is not made.
+struct SensorImages {
+  cv::Mat bgr;      // CV_8UC3, BGR: the frame as displayed
+  cv::Mat adc_bgr;  // CV_16UC3, BGR: the converter's numbers, after demosaicing
+  cv::Mat mosaic;   // CV_16U: the converter's numbers of a Bayer sensor, one a photosite
+};
+
 class SensorModel {
  public:
   SensorModel(const Sensor& sensor, const SensorOptions& options);
 
-  /// Automatic exposure from the noise-free frame alone, without memory of other frames: the mean
-  /// displayed brightness of the pixels that see the wall comes to kTargetBrightness, less where
-  /// more than kBrightShare of them would reach full scale. A longer exposure comes first, up to
-  /// half the frame's time, then gain up to kMostGain.
-  Exposure expose(const cv::Mat& radiance) const;
-
-  /// Mean electrons of a radiance (linear).
-  double electrons(double radiance, const Exposure& exposure) const;
+  /// See Metering.
+  Exposure expose(const cv::Mat& radiance) const { return metering_.expose(radiance); }
+  double electrons(double radiance, const Exposure& exposure) const {
+    return metering_.electrons(radiance, exposure);
+  }
   /// The ADC's number for electrons, round half up, clipped to its range.
   int adc(float electrons, const Exposure& exposure) const;
-  /// The 8-bit value of an ADC number by the sRGB curve (IEC 61966-2-1).
-  unsigned char display(int adc) const { return display_[adc]; }
-  int adc_top() const { return static_cast<int>(display_.size()) - 1; }
+  /// The 8-bit value of an ADC number (without white balance).
+  unsigned char display(int adc) const { return display_(1, adc); }
+  int adc_top() const { return adc_top_; }
 
-  /// CV_8UC3 in BGR; `radiance` is CV_32FC3 in RGB. Where a channel reaches the ADC's top,
-  /// kMaskSaturated is set in `masks` (CV_8U). Noise is a function of (seed, frame, pixel). Adds
+  /// `radiance` is CV_32FC3 in RGB. Where a channel reaches the ADC's top (of a Bayer sensor: the
+  /// photosite), kMaskSaturated is set in `masks` (CV_8U). Noise is a function of (seed, camera,
+  /// frame, pixel), the fixed patterns of (seed, camera, pixel). `keep_adc` asks for adc_bgr. Adds
   /// the processor seconds of all threads to `time_s`.
-  cv::Mat digitise(const cv::Mat& radiance, const Exposure& exposure, int frame, cv::Mat& masks,
-                   std::atomic<double>* time_s = nullptr) const;
-
-  // Measured on the twelve frames of the Kvasir-Capsule banner (Smedsrud et al. 2021,
-  // doi:10.1038/s41597-021-00920-z): mean luminance 87 to 113 of 255, 104 on average; at most 2 %
-  // of the pixels saturated in all but two.
-  static constexpr double kTargetBrightness = 0.41;
-  static constexpr double kBrightShare = 0.02;
-  static constexpr double kMostGain = 16.0;  // assumed: 24 dB, usual for small CMOS sensors
+  SensorImages digitise(const cv::Mat& radiance, const Exposure& exposure, int frame,
+                        cv::Mat& masks, bool keep_adc = false,
+                        std::atomic<double>* time_s = nullptr) const;
 
  private:
+  std::array<float, 3> measure(const Vec3f& light, float to_electrons, int frame,
+                               std::uint64_t pixel) const;
+  DisplayTable table_for(const cv::Mat& radiance, const Exposure& exposure) const;
+
   Sensor sensor_;
   SensorOptions options_;
   ElectronNoise noise_;
-  std::vector<unsigned char> display_;
+  NormalTable normal_;
+  Metering metering_;
+  int adc_top_;
+  DisplayTable display_;
 };
-
-/// sRGB's encoding of a linear value in [0, 1].
-double srgb_from_linear(double linear);
 
 }  // namespace rugae

@@ -12,6 +12,13 @@ void fields(Visitor& v, LensSettings& o) {
 template <typename Visitor>
 void fields(Visitor& v, SensorSettings& o) {
   v.flag("noise", o.noise);
+  v.flag("prnu", o.prnu);
+  v.flag("dsnu", o.dsnu);
+  v.choice("bayer", o.bayer, {"none", "rggb", "bggr", "grbg", "gbrg"});
+  v.choice("white_balance", o.white_balance, {"none", "fixed", "grey_world"});
+  v.number("red_gain", o.red_gain, 0.1, 10.0);
+  v.number("blue_gain", o.blue_gain, 0.1, 10.0);
+  v.choice("tone", o.tone, {"srgb", "gamma22", "linear"});
 }
 
 template <typename Visitor>

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/yaml.h"
+#include "render/sensor_settings.h"
 
 namespace rugae {
 
@@ -13,13 +14,10 @@ struct LensSettings {
   bool vignetting = true;
 };
 
-struct SensorSettings {
-  bool noise = true;  // shot and read noise
-};
-
 struct RenderSettings {
   LensSettings lens;
   SensorSettings sensor;
+  OutputSettings output;
   bool labels = true;  // truth images
   /// Throws Error naming the field, its value and its range.
   void check() const;

@@ -137,7 +137,7 @@ class FrameLoop {
     const Exposure exposure = sensor_.expose(clean.radiance);
     sensor_s += thread_seconds() - start;
     const cv::Mat bgr =
-        sensor_.digitise(clean.radiance, exposure, frame, clean.truth.masks, &sensor_s);
+        sensor_.digitise(clean.radiance, exposure, frame, clean.truth.masks, false, &sensor_s).bgr;
     {
       const std::lock_guard lock(mutex_);
       if (log_) log_->add(frame, exposure);
@@ -216,8 +216,8 @@ SimulateResult simulate(const SimulateOptions& options, const std::filesystem::p
   if (!todo.empty()) {
     const FrameRenderer renderer(scene, camera,
                                  {options.render.lens.vignetting, options.render.labels});
-    const SensorModel sensor(
-        camera.sensor, {options.render.sensor.noise, trajectory.read_noise_factor, options.seed});
+    const SensorModel sensor(camera.sensor,
+                             {options.render.sensor, trajectory.read_noise_factor, options.seed});
     ExposureLog log(out, exposures);
     FrameLoop loop(renderer, sensor, writer, path.track, &log);
     const Clock::time_point loop_start = Clock::now();

@@ -161,6 +161,12 @@ TEST(Camera, ErrorsNameThePlace) {
             file.string() + ":25:14: bit_depth is 40, expected 8 to 16");
   EXPECT_EQ(with("  width: 640", "  widht: 640"),
             file.string() + ":6:3: unknown key 'widht'; did you mean 'width'?");
+  EXPECT_EQ(with("prnu: 0.01", "prnu: -1 #"),
+            file.string() + ":29:9: prnu is -1, expected 0 to 0.2");
+  EXPECT_EQ(with("dsnu_e: 3", "dsnu_e: -3"),
+            file.string() + ":30:11: dsnu_e is -3, expected 0 to the full well's 18000");
+  EXPECT_EQ(with("black_level: 0", "black_level: 513"),
+            file.string() + ":31:16: black_level is 513, expected 0 to 512");
   EXPECT_EQ(with("  k1: -0.2", "  k1: -2.0 #"),
             file.string() + ":5:3: the distortion has no inverse at the image corner (0, 0)");
   std::filesystem::remove(file);

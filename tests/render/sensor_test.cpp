@@ -24,7 +24,7 @@ float radiance_for(const SensorModel& sensor, double electrons, const Exposure& 
 }
 
 TEST(Sensor, AdcRoundsAndClips) {
-  const SensorModel sensor(kSensor, {.noise = false});
+  const SensorModel sensor(kSensor, {{.noise = false}});
   ASSERT_EQ(sensor.adc_top(), 1023);
   for (double gain : {1.0, 2.0, 7.3}) {
     const Exposure exposure{0.01, gain};
@@ -57,13 +57,13 @@ TEST(Sensor, DisplayCurveIsSrgb) {
 }
 
 TEST(Sensor, WithoutNoiseTheChainIsExact) {
-  const SensorModel sensor(kSensor, {.noise = false});
+  const SensorModel sensor(kSensor, {{.noise = false}});
   const Exposure exposure{0.004, 3.0};
   for (int number : {0, 5, 300, 801, 1022}) {
     const cv::Mat light =
         gray(radiance_for(sensor, number * 18000.0 / (1023.0 * 3.0), exposure), 8, 8);
     cv::Mat masks = no_masks(light);
-    const cv::Mat image = sensor.digitise(light, exposure, 0, masks);
+    const cv::Mat image = sensor.digitise(light, exposure, 0, masks).bgr;
     for (int i = 0; i < 64; ++i) {
       ASSERT_EQ(image.ptr<cv::Vec3b>()[i], cv::Vec3b::all(sensor.display(number)));
       ASSERT_EQ(masks.ptr<unsigned char>()[i], 0);
@@ -72,18 +72,18 @@ TEST(Sensor, WithoutNoiseTheChainIsExact) {
 }
 
 TEST(Sensor, ColoursComeOutAsBlueGreenRed) {
-  const SensorModel sensor(kSensor, {.noise = false});
+  const SensorModel sensor(kSensor, {{.noise = false}});
   const Exposure exposure{0.01, 1.0};
   const float unit = radiance_for(sensor, 18000.0, exposure);
   const cv::Mat light(1, 1, CV_32FC3, cv::Scalar(0.8 * unit, 0.4 * unit, 0.1 * unit));
   cv::Mat masks = no_masks(light);
-  const auto pixel = sensor.digitise(light, exposure, 0, masks).at<cv::Vec3b>(0, 0);
+  const auto pixel = sensor.digitise(light, exposure, 0, masks).bgr.at<cv::Vec3b>(0, 0);
   EXPECT_GT(pixel[2], pixel[1]);
   EXPECT_GT(pixel[1], pixel[0]);
 }
 
 TEST(Sensor, SaturationIsMarkedWhereAChannelReachesTheTop) {
-  const SensorModel sensor(kSensor, {.noise = false});
+  const SensorModel sensor(kSensor, {{.noise = false}});
   const Exposure exposure{0.01, 2.0};
   cv::Mat light = gray(radiance_for(sensor, 4000.0, exposure), 4, 1);
   light.ptr<Vec3f>()[2][0] = radiance_for(sensor, 9500.0, exposure);
@@ -101,11 +101,11 @@ TEST(Sensor, SaturationIsMarkedWhereAChannelReachesTheTop) {
 TEST(Sensor, FramesHaveTheModelsMeanAndVariance) {
   for (double factor : {1.0, 4.0})
     for (double electrons : {600.0, 5000.0}) {
-      const SensorModel sensor(kSensor, {true, factor, 21});
+      const SensorModel sensor(kSensor, {{}, factor, 21});
       const Exposure exposure{0.01, 2.0};
       const cv::Mat light = gray(radiance_for(sensor, electrons, exposure), 256, 192);
       cv::Mat masks = no_masks(light);
-      const cv::Mat image = sensor.digitise(light, exposure, 5, masks);
+      const cv::Mat image = sensor.digitise(light, exposure, 5, masks).bgr;
       double sum = 0.0, squares = 0.0;
       const int n = 3 * 256 * 192;
       for (int i = 0; i < n; ++i) {
@@ -134,22 +134,22 @@ TEST(Sensor, FramesHaveTheModelsMeanAndVariance) {
 }
 
 TEST(Sensor, NoiseDependsOnSeedAndFrameOnly) {
-  const SensorModel a(kSensor, {true, 1.0, 1}), b(kSensor, {true, 1.0, 2});
+  const SensorModel a(kSensor, {{}, 1.0, 1}), b(kSensor, {{}, 1.0, 2});
   const Exposure exposure{0.01, 2.0};
   const cv::Mat light = gray(radiance_for(a, 2000.0, exposure));
   cv::Mat masks = no_masks(light);
   const auto equal = [](const cv::Mat& p, const cv::Mat& q) {
     return std::equal(p.data, p.data + p.total() * 3, q.data);
   };
-  const cv::Mat first = a.digitise(light, exposure, 3, masks);
-  EXPECT_TRUE(equal(first, a.digitise(light, exposure, 3, masks)));
-  EXPECT_FALSE(equal(first, a.digitise(light, exposure, 4, masks)));
-  EXPECT_FALSE(equal(first, b.digitise(light, exposure, 3, masks)));
+  const cv::Mat first = a.digitise(light, exposure, 3, masks).bgr;
+  EXPECT_TRUE(equal(first, a.digitise(light, exposure, 3, masks).bgr));
+  EXPECT_FALSE(equal(first, a.digitise(light, exposure, 4, masks).bgr));
+  EXPECT_FALSE(equal(first, b.digitise(light, exposure, 3, masks).bgr));
 }
 
 // Exposure: brightness comes to its target whatever the light, as long as time and gain allow.
 TEST(Sensor, ExposureFollowsTheLight) {
-  const SensorModel sensor(kSensor, {.noise = false});
+  const SensorModel sensor(kSensor, {{.noise = false}});
   double before = 0.0;
   for (float strength : {1e-4f, 3e-4f, 1e-3f, 1e-2f, 0.1f}) {
     cv::Mat light = gray(strength);
@@ -158,16 +158,16 @@ TEST(Sensor, ExposureFollowsTheLight) {
         light.ptr<Vec3f>(y)[x] *= static_cast<float>(std::exp2(2.0 * x / light.cols));
     const Exposure exposure = sensor.expose(light);
     EXPECT_GE(exposure.gain, 1.0);
-    EXPECT_LE(exposure.gain, SensorModel::kMostGain);
+    EXPECT_LE(exposure.gain, Metering::kMostGain);
     EXPECT_TRUE(exposure.time_s > 0.0 && exposure.time_s <= 0.5 / 30.0);
     if (exposure.gain > 1.0) {
       EXPECT_DOUBLE_EQ(exposure.time_s, 0.5 / 30.0);  // gain comes last
     }
     cv::Mat masks = no_masks(light);
-    const cv::Mat image = sensor.digitise(light, exposure, 0, masks);
+    const cv::Mat image = sensor.digitise(light, exposure, 0, masks).bgr;
     double sum = 0.0;
     for (std::size_t i = 0; i < image.total() * 3; ++i) sum += image.data[i];
-    EXPECT_NEAR(sum / (255.0 * 3.0 * image.total()), SensorModel::kTargetBrightness, 0.01);
+    EXPECT_NEAR(sum / (255.0 * 3.0 * image.total()), Metering::kTargetBrightness, 0.01);
     const double total = exposure.time_s * exposure.gain * strength;
     if (before > 0.0) {
       EXPECT_NEAR(total / before, 1.0, 0.01);
@@ -177,7 +177,7 @@ TEST(Sensor, ExposureFollowsTheLight) {
 }
 
 TEST(Sensor, ExposureSparesTheHighlights) {
-  const SensorModel sensor(kSensor, {.noise = false});
+  const SensorModel sensor(kSensor, {{.noise = false}});
   cv::Mat light = gray(1e-3f, 100, 100);
   for (int y = 0; y < 10; ++y)  // a tenth of the frame is up to forty times as bright
     for (int x = 0; x < 100; ++x) light.ptr<Vec3f>(y)[x] *= 0.04f * static_cast<float>(100 * y + x);
@@ -186,7 +186,7 @@ TEST(Sensor, ExposureSparesTheHighlights) {
   sensor.digitise(light, exposure, 0, masks);
   int saturated = 0;
   for (int i = 0; i < 10000; ++i) saturated += masks.data[i] != 0;
-  EXPECT_NEAR(saturated, SensorModel::kBrightShare * 10000, 20);
+  EXPECT_NEAR(saturated, Metering::kBrightShare * 10000, 20);
 }
 
 TEST(Sensor, DarknessTakesTheLongestExposure) {

@@ -32,5 +32,17 @@ TEST(Settings, MistakesAreNamed) {
       << change("sensor.noise=much");
 }
 
+TEST(Settings, MistakesOfTheSensorAreNamedToTheLetter) {
+  const auto change = [](const std::string& text) {
+    RenderSettings fresh;
+    return message_of([&] { change_setting(text, fresh); });
+  };
+  EXPECT_EQ(change("sensor.bayer=rgbg"),
+            "sensor.bayer=rgbg:1:18: bayer is 'rgbg', expected one of: none, rggb, bggr, grbg, "
+            "gbrg; did you mean 'rggb'?");
+  EXPECT_EQ(change("sensor.prnu=-1"),
+            "sensor.prnu=-1:1:17: prnu is '-1', expected true or false");
+}
+
 }  // namespace
 }  // namespace rugae
