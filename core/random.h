@@ -25,6 +25,8 @@ enum class Purpose : std::uint32_t {
   recon_ransac = 7,
   test = 8,
   oil = 9,
+  scene_instances = 20,
+  scene_draw = 21,
 };
 
 /// Four independent 32-bit words for (seed, purpose, frame, index); index is the pixel or whatever

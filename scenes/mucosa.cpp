@@ -4,6 +4,7 @@
 
 #include "core/check.h"
 #include "core/random.h"
+#include "scenes/instances.h"
 #include "scenes/lanes.h"
 #include "scenes/lattice_noise.h"
 #include "scenes/noise_tile.h"
@@ -25,7 +26,7 @@ constexpr float kVesselHalfMm = 0.33f;  // half width, blurred by the mucosa abo
 
 constexpr float kLongSlope = 0.10f, kShortSlope = 0.075f;  // of the wet layer, for a unit gradient
 constexpr float kGradientMeanSquare = 0.50f;               // of a tile's gradient, per component
-constexpr float kFilmAlpha = 0.065f, kOilAlpha = 0.04f;   // GGX roughness of mucus and of oil
+constexpr float kFilmAlpha = 0.065f, kOilAlpha = 0.04f;    // GGX roughness of mucus and of oil
 constexpr float kWaterF0 = 0.0207f;                        // ((n - 1) / (n + 1))^2 with n = 1.336
 constexpr float kOilF0 = 0.0362f;                          // n = 1.47
 
@@ -73,8 +74,11 @@ void MucosaOptions::check(const std::string& where) const {
 }
 
 Mucosa::Mucosa(const MucosaOptions& options, std::uint64_t seed,
-               std::shared_ptr<const RegionTint> tint)
-    : options_(options), base_albedo_(options.base_albedo.cast<float>()), tint_(std::move(tint)) {
+               std::shared_ptr<const RegionTint> tint, std::shared_ptr<const Instances> instances)
+    : options_(options),
+      base_albedo_(options.base_albedo.cast<float>()),
+      tint_(std::move(tint)),
+      instances_(instances && !instances->list().empty() ? std::move(instances) : nullptr) {
   options.check("mucosa");
   const auto words = random_words(seed, Purpose::scene_mucosa, 0, 0);
   const auto smooth = [&](const Vec3& p) -> NoiseTile::Channels {
@@ -199,6 +203,11 @@ MucosaSample Mucosa::sample(const Vec3f& rest_position_mm, const Vec3f& normal, 
   // lost (Olano and Baker, LEAN mapping, I3D 2010, doi:10.1145/1730804.1730834).
   out.roughness = std::sqrt(alpha * alpha + 2.0f * kGradientMeanSquare * lost_slope * calm * calm);
   out.coat_gradient = vec3(tangential(slope, n) * splat(calm));
+  if (instances_) {
+    const Vec3 place = rest_position_mm.cast<double>();
+    if (const Instances::Hit hit = instances_->at(place); hit.instance)
+      paint_instance(hit, place, normal, out);
+  }
   return out;
 }
 

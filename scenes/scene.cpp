@@ -8,6 +8,7 @@
 #include "core/yaml.h"
 #include "scenes/deformation.h"
 #include "scenes/import.h"
+#include "scenes/instances.h"
 #include "scenes/long_axis.h"
 #include "scenes/region_tint.h"
 #include "scenes/stomach.h"
@@ -51,6 +52,22 @@ void read_mucosa(YamlReader yaml, MucosaOptions& mucosa, const std::string& wher
   mucosa.check(where);
 }
 
+void read_lesions(YamlReader yaml, InstanceOptions& instances) {
+  yaml.get("polyp", instances.polyp);
+  yaml.get("ulcer", instances.ulcer);
+  yaml.get("erosion", instances.erosion);
+  yaml.get("bleeding", instances.bleeding);
+  yaml.get("angiectasia", instances.angiectasia);
+  yaml.finish();
+}
+
+void read_objects(YamlReader yaml, InstanceOptions& instances) {
+  yaml.get("debris", instances.debris);
+  yaml.get("bubbles", instances.bubbles);
+  yaml.get("mucus", instances.mucus);
+  yaml.finish();
+}
+
 void read_import(YamlReader& yaml, SceneFile& scene, const std::filesystem::path& file) {
   std::string mesh;
   yaml.require("mesh", mesh);
@@ -88,6 +105,11 @@ SceneFile read_scene_file(const std::filesystem::path& file) {
     read_deformation(*deformation, scene.deformation);
     scene.deformation.check(file.string() + ": deformation");
   }
+  for (const char* key : {"lesions", "objects"})
+    check(scene.kind == Kind::procedural || !yaml.has(key),
+          "{}: {} need a stomach of kind procedural", yaml.where(key), key);
+  if (auto lesions = yaml.child("lesions")) read_lesions(*lesions, scene.stomach.instances);
+  if (auto objects = yaml.child("objects")) read_objects(*objects, scene.stomach.instances);
   yaml.finish();
   scene.stomach.check(file.string());
   return scene;
@@ -119,6 +141,12 @@ bool is_mesh_file(const std::string& name_or_path) {
 
 }  // namespace
 
+int Scene::instance_at(const Vec3f& rest_position_mm) const {
+  if (!instances) return 0;
+  const Instances::Hit hit = instances->at(rest_position_mm.cast<double>());
+  return hit.instance ? hit.instance->id : 0;
+}
+
 Scene load_scene(const SceneRequest& request) {
   const auto resolution = std::ranges::find(kResolutions, request.resolution);
   check(resolution != kResolutions.end(),
@@ -138,6 +166,7 @@ Scene load_scene(const SceneRequest& request) {
   ImportedWall wall;
   std::vector<Region> regions;
   std::shared_ptr<const RegionTint> tint;
+  std::vector<WallInstance> instances;
   if (file.kind == Kind::mesh) {
     wall = import_wall(file.mesh, file.import, request.seed, level);
     regions.assign(wall.mesh.vertices.size(), Region::unknown);
@@ -146,16 +175,19 @@ Scene load_scene(const SceneRequest& request) {
         make_stomach(file.stomach, request.seed, kCellMm[level] * file.stomach.scale);
     wall.mesh = std::move(stomach.mesh);
     regions = std::move(stomach.regions);
+    instances = std::move(stomach.instances);
     const StomachShape shape(file.stomach.scale);
     tint = std::make_shared<RegionTint>(
         shape.box(), [&](const Vec3& p) { return shape.region(p, shape.locate(p)); });
   }
+  const auto shared = std::make_shared<const Instances>(std::move(instances));
   OrganMotion motion = find_motion(file, wall.mesh);
   Scene scene{.name = std::filesystem::path(request.name_or_path).stem().string(),
               .wall = std::move(wall.mesh),
               .rest_positions = {},
               .regions = std::move(regions),
-              .mucosa = Mucosa(file.mucosa, request.seed, std::move(tint)),
+              .instances = shared,
+              .mucosa = Mucosa(file.mucosa, request.seed, std::move(tint), shared),
               .motion = std::move(motion.motion),
               .motion_reach_mm = motion.reach_mm,
               .seed = request.seed,

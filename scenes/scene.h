@@ -48,15 +48,18 @@ struct MucosaOptions {
   void check(const std::string& where) const;
 };
 
+class Instances;
 class RegionTint;
 
 /// The mucosa as a pure function of the rest position, so that no UV map is needed and deformation
 /// carries it along. Copies share their noise tiles; sampling is safe from many threads at once.
 class Mucosa {
  public:
-  /// Without a tint every region has the colour of the body (the oesophagus' pale one apart).
+  /// Without a tint every region has the colour of the body (the oesophagus' pale one apart);
+  /// without instances there are no lesions and objects.
   Mucosa(const MucosaOptions& options, std::uint64_t seed,
-         std::shared_ptr<const RegionTint> tint = nullptr);
+         std::shared_ptr<const RegionTint> tint = nullptr,
+         std::shared_ptr<const Instances> instances = nullptr);
   /// `normal` is the wall's unit normal at rest, of either side. `footprint_mm` is the width of a
   /// pixel on the wall: detail finer than twice that is faded out, and the slopes that faded go
   /// into the roughness.
@@ -69,6 +72,7 @@ class Mucosa {
   Vec3f base_albedo_;
   std::shared_ptr<const Tiles> tiles_;
   std::shared_ptr<const RegionTint> tint_;
+  std::shared_ptr<const Instances> instances_;  // null where there are none
 };
 
 /// Moves the wall: fills `vertices_mm` with where the wall's vertices are at `time_s` (seconds
@@ -82,11 +86,16 @@ struct Scene {
   std::vector<Vec3> rest_positions;  // of the vertices: where they are, relief and all, before any
                                      // deformation; what the mucosa is a function of
   std::vector<Region> regions;       // of the vertices
+  std::shared_ptr<const Instances> instances;  // lesions and objects; null: none
   Mucosa mucosa;
   WallMotion motion;             // empty: the wall keeps still
   double motion_reach_mm = 0.0;  // no vertex is ever farther from its rest position
   std::uint64_t seed = 1;
   std::vector<std::string> notes;  // of an imported mesh: what was found and done, a line each
+
+  /// Id of the lesion or object that holds a rest position, 0 for none: the rule of
+  /// Instances::at, which the colours and the wall's shape follow too.
+  int instance_at(const Vec3f& rest_position_mm) const;
 };
 
 /// A preset name, a YAML file, or any mesh file that assimp reads (units by `mm_per_unit` in YAML;

@@ -77,6 +77,7 @@ std::string region_name(Region region) {
 void StomachOptions::check(const std::string& where) const {
   rugae::check(scale >= 0.3 && scale <= 2.0, "{}: scale is {}, expected 0.3 to 2", where, scale);
   relief.check(where);
+  instances.check(where);
 }
 
 StomachShape::StomachShape(double scale)
@@ -132,6 +133,31 @@ double StomachShape::length_mm() const {
   return scale_ * kAxis[0].radius + axis_.node_s_mm(kPylorusNode + 1);
 }
 
+namespace {
+
+// The wall that is nearest to a point within a few millimetres of it, by Newton's method.
+PlaceOnWall place_on(const StomachShape& shape, const Relief& relief) {
+  return [&](const Vec3& near_mm, WallPlace& place) {
+    constexpr double kNearMm = 8.0;
+    Vec3 p = near_mm, gradient;
+    double distance = shape.distance_mm(p, &gradient);
+    if (std::abs(distance) > kNearMm) return false;
+    for (int step = 0; step < 8; ++step) {
+      p -= distance / gradient.squaredNorm() * gradient;
+      distance = shape.distance_mm(p, &gradient);
+    }
+    constexpr double kOnTheWallMm = 1e-6;
+    if (!(std::abs(distance) <= kOnTheWallMm)) return false;
+    const AxisPoint at = shape.locate(p);
+    place.inward = -gradient.normalized();
+    place.p_mm = p + relief.height_mm(p, at) * place.inward;
+    place.region = shape.region(p, at);
+    return true;
+  };
+}
+
+}  // namespace
+
 StomachWall make_stomach(const StomachOptions& options, std::uint64_t seed, double cell_mm) {
   const StomachShape shape(options.scale);
   const Relief relief(options.relief, shape.fold_zone(), shape.axis(), seed);
@@ -141,13 +167,19 @@ StomachWall make_stomach(const StomachOptions& options, std::uint64_t seed, doub
                          shape.box(), cell_mm, kRelaxRounds, "stomach");
   auto& vertices = wall.mesh.vertices;
   wall.regions.resize(vertices.size());
+  wall.instances = place_instances(options.instances, shape.box(), area_mm2(wall.mesh),
+                                   place_on(shape, relief), seed, "stomach");
+  const Instances instances(wall.instances);
   tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t v) {
     const Vec3 p = vertices[v];
     Vec3 gradient;
     shape.distance_mm(p, &gradient);
     const AxisPoint at = shape.locate(p);
     wall.regions[v] = shape.region(p, at);
-    vertices[v] = p - relief.height_mm(p, at) * gradient.normalized();
+    const Vec3 folded = p - relief.height_mm(p, at) * gradient.normalized();
+    const Instances::Hit hit = instances.at(folded);
+    vertices[v] =
+        hit.instance ? Vec3(folded + Instances::raise_mm(hit) * hit.instance->inward) : folded;
   });
   recut_quads(wall.mesh);
   wall.mesh.normals = smooth_normals(wall.mesh);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "scenes/deformation.h"
+#include "scenes/instances.h"
 #include "scenes/relief.h"
 #include "scenes/scene.h"
 
@@ -13,6 +14,7 @@ namespace rugae {
 struct StomachOptions {
   double scale = 1.0;  // of all lengths of the smooth shape; 1: about 1.5 l
   ReliefOptions relief;
+  InstanceOptions instances;
   void check(const std::string& where) const;
 };
 
@@ -40,10 +42,11 @@ class StomachShape {
 struct StomachWall {
   TriangleMesh mesh;  // closed, with vertex normals, outward
   std::vector<Region> regions;
+  std::vector<WallInstance> instances;
 };
 
 /// `cell_mm` sets the triangle size: about 3 area / cell^2 triangles. The same seed gives the same
-/// surface at every cell size.
+/// surface at every cell size. Throws Error when the lesions and objects find no room.
 StomachWall make_stomach(const StomachOptions& options, std::uint64_t seed, double cell_mm);
 
 }  // namespace rugae
