@@ -10,8 +10,10 @@
 #include "core/presets.h"
 #include "core/progress.h"
 #include "dataset/check_dataset.h"
+#include "dataset/check_folder.h"
 #include "dataset/frame_sheet.h"
 #include "dataset/image_io.h"
+#include "dataset/layout.h"
 #include "dataset/observations.h"
 #include "recon/pipeline.h"
 #include "render/simulate.h"
@@ -195,14 +197,30 @@ void add_run(CLI::App& app, int& exit_code) {
 void add_check(CLI::App& app, int& exit_code) {
   struct Arguments {
     fs::path dataset;
+    PlainFolderOptions parts;
     bool json = false;
   };
   const auto a = std::make_shared<Arguments>();
-  CLI::App& command = *app.add_subcommand("check", "Is this dataset whole and consistent?");
-  command.add_option("dataset", a->dataset)->required();
+  CLI::App& command = *app.add_subcommand(
+      "check", "Is this dataset, or any folder of images, depth and poses, whole and consistent?");
+  command.add_option("dataset", a->dataset, "A dataset, or a folder made by others")->required();
+  command.add_option("--images", a->parts.images, "Folder of images, of a folder made by others");
+  command.add_option("--depth", a->parts.depth, "Folder of depth: EXR, or 16-bit PNG");
+  command
+      .add_option("--depth-scale", a->parts.depth_scale, "Millimetres per unit of the depth files")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--poses", a->parts.poses, "Poses in TUM format, world_from_camera, mm");
+  command.add_option("--flow", a->parts.flow, "Folder of flow to the next frame: EXR or .flo, px");
+  command.add_option("--masks", a->parts.masks, "Folder of masks: not 0 where depth holds");
+  command.add_option("--calibration", a->parts.calibration, "Lens YAML");
   add_json_flag(command, a->json);
   command.callback([a, &exit_code] {
-    const DatasetCheck result = check_dataset(a->dataset);
+    const PlainFolderOptions& p = a->parts;
+    const bool told =
+        p.depth_scale > 0.0 || !(p.images.empty() && p.depth.empty() && p.poses.empty() &&
+                                 p.flow.empty() && p.masks.empty() && p.calibration.empty());
+    const bool ours = !told && fs::exists(DatasetLayout{a->dataset}.info());
+    const DatasetCheck result = ours ? check_dataset(a->dataset) : check_folder(a->dataset, p);
     constexpr int kBadInput = 2;
     if (!result.problems.empty()) exit_code = kBadInput;
     std::string text;

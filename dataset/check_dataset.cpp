@@ -3,25 +3,22 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <map>
 #include <optional>
-#include <set>
 
 #include "core/check.h"
 #include "core/files.h"
 #include "dataset/check_labels.h"
+#include "dataset/diagnose.h"
 #include "dataset/frame_list.h"
 #include "dataset/image_io.h"
 #include "dataset/manifest.h"
 #include "dataset/ply_io.h"
+#include "dataset/problem_list.h"
 #include "dataset/writer.h"
 
 namespace rugae {
 namespace fs = std::filesystem;
 namespace {
-
-// A camera that never moves further than this from its first pose has lost its path: mm and rad.
-constexpr double kMoves = 1e-6;
 
 class Checker {
  public:
@@ -30,88 +27,51 @@ class Checker {
   DatasetCheck run() {
     const DatasetInfo info = read_info(layout_.info());
     result_.frames = info.frames;
-    check_manifest();
-    const auto camera = attempt([&] { return load_camera(layout_.camera().string()); });
-    attempt([&] { return load_lens(layout_.calibration()); });
-    attempt([&] {
+    check_files();
+    const auto camera = problems_.attempt([&] { return load_camera(layout_.camera().string()); });
+    problems_.attempt([&] { return load_lens(layout_.calibration()); });
+    problems_.attempt([&] {
       const TriangleMesh wall = read_ply(layout_.wall());
       check_mesh(wall, layout_.wall().string());
       return wall.vertices.size();
     });
-    const auto track = attempt([&] { return read_tum(layout_.trajectory()); });
+    const auto track = problems_.attempt([&] { return read_tum(layout_.trajectory()); });
     if (track) check_track(*track, info.frames);
     if (track) check_times(*track, info.frames);
     if (camera) check_frames(camera->lens, info.frames);
     if (camera && track && info.labels && static_cast<int>(track->size()) == info.frames)
       check_all_labels({layout_, camera->lens, *track}, info.frames);
+    if (camera && track && info.labels && static_cast<int>(track->size()) == info.frames &&
+        problems_.none())
+      check_colour(camera->lens, *track);
+    result_.problems = problems_.take();
     return std::move(result_);
   }
 
  private:
-  void note(std::string problem) {
-    if (std::ranges::find(result_.problems, problem) == result_.problems.end())
-      result_.problems.push_back(std::move(problem));
-  }
-
-  // The result of `action`, or nothing and its error noted. Files that are not there were noted
-  // when the manifest was read.
-  template <typename Action>
-  auto attempt(Action&& action) -> std::optional<decltype(action())> {
-    try {
-      return action();
-    } catch (const Error& error) {
-      const std::string text = error.what();
-      if (!text.ends_with(": no such file")) note(text);
-      return std::nullopt;
-    }
-  }
-
+  void note(std::string problem) { problems_.note(std::move(problem)); }
   void note_missing(const fs::path& file) {
     if (!fs::exists(file)) note(file.string() + ": missing");
   }
 
-  void check_manifest() {
-    const auto files = files_below(layout_.root, layout_.manifest().filename().string());
-    result_.files = files.size();
-    if (!fs::exists(layout_.manifest())) {
+  void check_files() {
+    result_.files = files_below(layout_.root, layout_.manifest().filename().string()).size();
+    if (fs::exists(layout_.manifest()))
+      check_manifest(layout_.root, problems_);
+    else
       note(layout_.manifest().string() + ": missing: the dataset was not finished");
-      return;
-    }
-    const auto expected = attempt([&] { return read_manifest(layout_.manifest()); });
-    if (!expected) return;
-    const std::set<std::string> present(files.begin(), files.end());
-    for (const auto& [file, hash] : *expected)
-      if (!present.contains(file)) note((layout_.root / file).string() + ": missing");
-    const auto hashes = hashes_of(layout_.root, files);
-    for (std::size_t i = 0; i < files.size(); ++i) {
-      const auto entry = expected->find(files[i]);
-      const std::string name = (layout_.root / files[i]).string();
-      if (entry == expected->end())
-        note(name + ": not in the manifest");
-      else if (entry->second != hashes[i])
-        note(
-            fmt::format("{}: changed since it was written (SHA-256 {}..., the manifest says {}...)",
-                        name, hashes[i].substr(0, 8), entry->second.substr(0, 8)));
-    }
   }
 
   void check_track(const PoseTrack& track, int frames) {
     const std::string name = layout_.trajectory().string();
     if (static_cast<int>(track.size()) != frames)
       note(fmt::format("{}: {} poses for {} frames", name, track.size(), frames));
-    if (track.size() < 2) return;
-    const Rigid3& first = track.front().world_from_camera;
-    const bool moves = std::ranges::any_of(track, [&first](const TimedPose& pose) {
-      const Rigid3& p = pose.world_from_camera;
-      return (p.translation - first.translation).norm() > kMoves ||
-             angle_between_rad(p.rotation, first.rotation) > kMoves;
-    });
-    if (!moves) note(fmt::format("{}: the camera never moves: {} equal poses", name, track.size()));
+    check_moves(track, name, problems_);
   }
 
   void check_times(const PoseTrack& track, int frames) {
     const std::string name = layout_.frame_list().string();
-    const auto records = attempt([&] { return read_frame_list(layout_.frame_list()); });
+    const auto records = problems_.attempt([&] { return read_frame_list(layout_.frame_list()); });
     if (!records) return;
     if (static_cast<int>(records->size()) != frames)
       note(fmt::format("{}: {} lines for {} frames", name, records->size(), frames));
@@ -170,7 +130,21 @@ class Checker {
                                    more == 1 ? "" : "s"));
   }
 
+  // Labels agree with each other: do they belong to the pictures?
+  void check_colour(const Lens& lens, const PoseTrack& track) {
+    WarpSequence sequence;
+    sequence.lens = lens;
+    for (const TimedPose& pose : track)
+      sequence.world_from_camera.push_back(pose.world_from_camera);
+    sequence.read_gray = [this](int i) { return read_image_gray(layout_.frame(i)); };
+    sequence.read_depth_mm = [this](int i) { return read_exr(layout_.depth(i)); };
+    const WarpNames names{layout_.frames().string(), layout_.depth(0).parent_path().string(),
+                          layout_.trajectory().string(), layout_.flow(0).parent_path().string()};
+    for (std::string& problem : diagnose_colour(sequence, names)) note(std::move(problem));
+  }
+
   DatasetLayout layout_;
+  ProblemList problems_;
   DatasetCheck result_;
 };
 

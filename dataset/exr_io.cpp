@@ -62,7 +62,11 @@ void write_exr(const fs::path& file, const cv::Mat& image) {
   write_atomic(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
-cv::Mat read_exr(const fs::path& file) {
+namespace {
+
+// `fits` looks at the file's format and channels before its pixels are read.
+template <typename Fits>
+cv::Mat read_checked(const fs::path& file, Fits&& fits) {
   use_callers_thread();
   const std::string bytes = read_text(file);
   OIIO::Filesystem::IOMemReader memory(const_cast<char*>(bytes.data()), bytes.size());
@@ -72,15 +76,30 @@ cv::Mat read_exr(const fs::path& file) {
     fail("{}: truncated or not an image", file.string());
   }
   const OIIO::ImageSpec spec = in->spec();
-  check(std::string_view(in->format_name()) == "openexr" && spec.format == OIIO::TypeDesc::FLOAT &&
-            spec.channelnames == channel_names(spec.nchannels),
-        "{}: channels {} of {} in {}, expected float32 OpenEXR with Y, or x y, or x y z",
-        file.string(), fmt::join(spec.channelnames, " "), spec.format.c_str(), in->format_name());
-  cv::Mat image(spec.height, spec.width, CV_MAKETYPE(CV_32F, spec.nchannels));
-  const bool read = in->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, image.data);
+  check(std::string_view(in->format_name()) == "openexr", "{}: is {}, expected OpenEXR",
+        file.string(), in->format_name());
+  fits(spec);
+  const int channels = std::min(spec.nchannels, 4);
+  cv::Mat image(spec.height, spec.width, CV_MAKETYPE(CV_32F, channels));
+  const bool read = in->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, image.data);
   if (!read) in->geterror();
   check(read, "{}: truncated or not an image", file.string());
   return image;
+}
+
+}  // namespace
+
+cv::Mat read_exr(const fs::path& file) {
+  return read_checked(file, [&file](const OIIO::ImageSpec& spec) {
+    check(
+        spec.format == OIIO::TypeDesc::FLOAT && spec.channelnames == channel_names(spec.nchannels),
+        "{}: channels {} of {} in openexr, expected float32 OpenEXR with Y, or x y, or x y z",
+        file.string(), fmt::join(spec.channelnames, " "), spec.format.c_str());
+  });
+}
+
+cv::Mat read_any_exr(const fs::path& file) {
+  return read_checked(file, [](const OIIO::ImageSpec&) {});
 }
 
 }  // namespace rugae

@@ -28,6 +28,9 @@ bool has_image_extension(const std::filesystem::path& file);
 void write_exr(const std::filesystem::path& file, const cv::Mat& image);
 /// CV_32F of as many channels as the file has. Throws Error as above.
 cv::Mat read_exr(const std::filesystem::path& file);
+/// Any OpenEXR file that others wrote: CV_32F of its first channels (four at most), whatever their
+/// names and precision.
+cv::Mat read_any_exr(const std::filesystem::path& file);
 
 /// Unit normals (CV_32FC3, NaN where there is none) as a 16-bit PNG: red, green, blue hold round(
 /// 32767 n + 32768 ) of x, y, z; all zero where there is no normal. The direction is kept to 0.0016
