@@ -150,6 +150,7 @@ Camera load_camera(const std::string& name_or_path) {
   const auto sensor = yaml.child("sensor");
   check(sensor.has_value(), "{}: key 'sensor' is missing", yaml.where("sensor"));
   camera.sensor = read_sensor(*sensor, camera.lens.height);
+  camera.lights = read_lights(yaml);
   yaml.finish();
   const double w = camera.lens.width, h = camera.lens.height;
   for (const Vec2& corner : {Vec2(0, 0), Vec2(w, 0), Vec2(0, h), Vec2(w, h)})
@@ -217,6 +218,7 @@ std::string camera_yaml(const Camera& camera) {
   if (s.shutter == Shutter::rolling) text += fmt::format("  row_time_us: {:.17g}\n", s.row_time_us);
   text += fmt::format("  prnu: {:.17g}\n  dsnu_e: {:.17g}\n  black_level: {}\n", s.prnu, s.dsnu_e,
                       s.black_level);
+  text += lights_yaml(camera.lights);
   return text;
 }
 

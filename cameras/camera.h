@@ -1,11 +1,12 @@
 #pragma once
-// A camera: its lens (where a ray lands), its light fall-off, its sensor. Presets:
+// A camera: its lens (where a ray lands), its light fall-off, its sensor, its lights. Presets:
 // cameras/presets/*.yaml.
 
 #include <filesystem>
 #include <optional>
 #include <string>
 
+#include "cameras/emitter.h"
 #include "core/types.h"
 
 namespace rugae {
@@ -94,6 +95,7 @@ struct Camera {
   Lens lens;
   Vignetting vignetting;
   Sensor sensor;
+  std::vector<Emitter> lights = {Emitter{}};
   int frames_in_paper = 0;   // of all six trajectories together
   double diameter_mm = 0.0;  // of the housing, bounds the clearance
 };

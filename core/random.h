@@ -25,6 +25,7 @@ enum class Purpose : std::uint32_t {
   recon_ransac = 7,
   test = 8,
   oil = 9,
+  light_path = 12,
   scene_instances = 20,
   scene_draw = 21,
 };

@@ -1,5 +1,9 @@
 #include "render/bsdf.h"
 
+#include <algorithm>
+
+#include "scenes/portable_math.h"
+
 namespace rugae {
 
 // D(h) = alpha^2 / (pi (cos^2 (alpha^2 - 1) + 1)^2)
@@ -39,6 +43,30 @@ double wall_brdf(const Coat& coat, double albedo, const Vec3& in, const Vec3& ou
     return 1.0 - coat.coverage * schlick_fresnel(cosine, coat.f0);
   };
   return through(in.z()) * through(out.z()) * albedo / kPi;
+}
+
+// The ellipsoid of facets is stretched to a hemisphere, whose visible part projects to a disk cut
+// short on one side; a point of it is drawn and taken back.
+Vec3 sample_visible_facet(double alpha, const Vec3& out, double u1, double u2) {
+  const Vec3 view = Vec3(alpha * out.x(), alpha * out.y(), out.z()).normalized();
+  const double across2 = view.x() * view.x() + view.y() * view.y();
+  const Vec3 e1 = across2 > 0.0 ? Vec3(Vec3(-view.y(), view.x(), 0.0) / std::sqrt(across2))
+                                : Vec3(Vec3::UnitX());
+  const Vec3 e2 = view.cross(e1);
+  const double radius = std::sqrt(u1);
+  const SineCosine turn = portable_turn(u2);
+  const double a = radius * turn.cosine, share = 0.5 * (1.0 + view.z());
+  const double rest = std::sqrt(std::max(0.0, 1.0 - a * a));
+  const double b = (1.0 - share) * rest + share * radius * turn.sine;
+  const Vec3 n = a * e1 + b * e2 + std::sqrt(std::max(0.0, 1.0 - a * a - b * b)) * view;
+  return Vec3(alpha * n.x(), alpha * n.y(), std::max(1e-9, n.z())).normalized();
+}
+
+double visible_facet_pdf(double alpha, const Vec3& out, const Vec3& half) {
+  if (!(out.z() > 0.0)) return 0.0;
+  // G1 is G2 with the other side unmasked.
+  return smith_masking(out.z(), 1.0, alpha) * ggx_distribution(half.z(), alpha) *
+         std::max(0.0, out.dot(half)) / out.z();
 }
 
 }  // namespace rugae

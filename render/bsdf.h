@@ -34,6 +34,12 @@ double coat_brdf(const Coat& coat, const Vec3& in, const Vec3& out);
 /// The wall's share of f, 1 / sr.
 double wall_brdf(const Coat& coat, double albedo, const Vec3& in, const Vec3& out);
 
+/// A facet's normal seen from `out`, drawn with the density that visible_facet_pdf gives; u are
+/// uniform in (0, 1). Heitz, Sampling the GGX distribution of visible normals, JCGT 7(4), 2018.
+Vec3 sample_visible_facet(double alpha, const Vec3& out, double u1, double u2);
+/// 1 / sr over facet normals: G1(out) D(h) (out . h) / cos_out.
+double visible_facet_pdf(double alpha, const Vec3& out, const Vec3& half);
+
 /// Light and eye in one place, in = out: what the frames use. Both times cos_i, so that
 /// radiance = value * I / d^2. Half vector and direction are the same, so F is F0 and
 ///   coat cos = coverage D(c) F0 / (4 sqrt(c^2 + alpha^2 (1 - c^2))).

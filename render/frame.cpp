@@ -16,18 +16,25 @@ struct Scratch {
   Tile tile;
   SurfaceTile surface;
   RadianceTile radiance;
+  Lanes<Vec3f> indirect;
+  PathTracer paths;
+
+  explicit Scratch(const PathOptions& options) : paths(options) {}
 };
 
-void store(const Scratch& s, const RayTable& rays, bool vignetting, CleanFrame& frame) {
+void store(const Scratch& s, const RayTable& rays, const RenderOptions& options,
+           CleanFrame& frame) {
   auto* out = frame.radiance.ptr<Vec3f>();
   auto* masks = frame.truth.masks.ptr<unsigned char>();
   for (int k = 0; k < s.surface.count; ++k) {
     const int i = s.tile.pixel[s.surface.lane[k]];
     const RadianceTile& r = s.radiance;
-    const float light = vignetting ? rays.vignetting[i] : 1.0f;
-    out[i] = light * Vec3f(r.red[k], r.green[k], r.blue[k]);
+    const float light = options.vignetting ? rays.vignetting[i] : 1.0f;
+    Vec3f all = r.wall[k] * s.surface.material[k].albedo + Vec3f::Constant(r.coat[k]);
+    if (options.paths.bounces > 0) all += s.indirect[k];
+    out[i] = light * all;
     masks[i] |= kMaskValid;
-    if (r.coat[k] > kSpecularShare * luminance(r.red[k], r.green[k], r.blue[k]))
+    if (r.coat[k] > kSpecularShare * luminance(all.x(), all.y(), all.z()))
       masks[i] |= kMaskSpecular;
   }
 }
@@ -65,7 +72,7 @@ CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous
   const int columns = (rays_.width + kTileWidth - 1) / kTileWidth;
   const int rows = (rays_.height + kTileHeight - 1) / kTileHeight;
   tbb::parallel_for(tbb::blocked_range<int>(0, columns * rows, 4), [&](const auto& range) {
-    const auto s = std::make_unique<Scratch>();
+    const auto s = std::make_unique<Scratch>(options_.paths);
     for (int t = range.begin(); t < range.end(); ++t) {
       const double start = thread_seconds();
       place_tile(rays_, instants, t % columns * kTileWidth, t / columns * kTileHeight, s->tile);
@@ -74,8 +81,11 @@ CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous
                                  {s->tile.hit.data(), n});
       const double traced = thread_seconds();
       wall.surface().look_up(s->tile, rays_, s->surface);
-      shade(light_, s->tile, s->surface, s->radiance);
-      store(*s, rays_, options_.vignetting, frame);
+      shade(camera_.lights, wall, s->tile, s->surface, s->radiance);
+      if (options_.paths.bounces > 0)
+        s->paths.trace(camera_.lights, wall, s->tile, s->surface,
+                       static_cast<std::uint32_t>(now.index), s->indirect);
+      store(*s, rays_, options_, frame);
       const double shaded = thread_seconds();
       if (options_.labels) label_tile(s->tile, rays_, lens_, view, frame.truth);
       if (times) {
@@ -89,8 +99,9 @@ CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous
 }
 
 CleanFrame FrameRenderer::render(const Rigid3& world_from_camera, const Rigid3* next,
-                                 RenderTimes* times) const {
+                                 RenderTimes* times, int index) const {
   FrameView now, after;
+  now.index = index;
   now.camera = RowPoses(world_from_camera);
   if (next) after.camera = RowPoses(*next);
   return render(now, nullptr, next ? &after : nullptr, times);

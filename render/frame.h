@@ -6,8 +6,8 @@
 
 #include "dataset/truth.h"
 #include "render/labels.h"
-#include "render/light.h"
 #include "render/motion.h"
+#include "render/path_trace.h"
 #include "render/surface.h"
 
 namespace rugae {
@@ -21,6 +21,7 @@ struct RenderOptions {
   bool vignetting = true;
   bool labels = true;
   LabelChoice choice = {};  // of those that are not always there
+  PathOptions paths = {};   // of light that comes over other walls
 };
 
 struct CleanFrame {
@@ -41,9 +42,9 @@ class FrameRenderer {
   /// caller's arena; the result does not depend on how.
   CleanFrame render(const FrameView& now, const FrameView* previous, const FrameView* next,
                     RenderTimes* times = nullptr) const;
-  /// With a global shutter and a wall that keeps still.
+  /// With a global shutter and a wall that keeps still; `index` is the frame's.
   CleanFrame render(const Rigid3& world_from_camera, const Rigid3* next,
-                    RenderTimes* times = nullptr) const;
+                    RenderTimes* times = nullptr, int index = 0) const;
 
   const RayTable& rays() const { return rays_; }
   const Wall& wall() const { return wall_; }  // at rest
@@ -56,7 +57,6 @@ class FrameRenderer {
   RenderOptions options_;
   RayTable rays_;
   LensProjector lens_;
-  PointLight light_;
 };
 
 }  // namespace rugae

@@ -106,6 +106,7 @@ std::shared_ptr<const Wall> Motion::wall(int frame) const {
 
 FrameView Motion::view(int frame) const {
   FrameView view;
+  view.index = frame;
   view.fps = options_.fps;
   if (motion_) view.wall = wall(frame);
   if (options_.row_time_s > 0.0) {

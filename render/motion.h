@@ -19,6 +19,7 @@ using CameraPath = std::function<Rigid3(double frame)>;
 
 /// Camera and wall while a frame is taken.
 struct FrameView {
+  int index = 0;  // of the frame
   RowPoses camera;
   std::shared_ptr<const Wall> wall;  // null: the wall at rest
   double fps = 0.0;                  // one beat of the wall is the time between two frames

@@ -1,20 +1,24 @@
 #pragma once
-// Light that comes back from the wall to the camera.
+// Light that comes from the lights to the wall and straight back to the camera.
+
+#include <span>
 
 #include "render/light.h"
-#include "render/surface.h"
+#include "render/wall.h"
 
 namespace rugae {
 
-/// Linear RGB radiance towards the camera of the lanes of a SurfaceTile, split by origin.
+/// Linear radiance towards the camera of the lanes of a SurfaceTile, split by origin:
+/// RGB = wall albedo + coat.
 struct RadianceTile {
-  Lanes<float> red, green, blue;  // of both
-  Lanes<float> coat;              // of the wet layer alone, the same in every channel
+  Lanes<float> wall;  // for an albedo of 1
+  Lanes<float> coat;  // of the wet layer, the same in every channel
 };
 
-/// Direct light of one emitter at the camera centre, no bounces.
-void shade(const PointLight& light, const Tile& tile, const SurfaceTile& surface,
-           RadianceTile& radiance);
+/// Direct light of all emitters. One at the camera's centre lights what the camera sees; for the
+/// others a ray from the light decides whether wall stands in between.
+void shade(std::span<const Emitter> lights, const Wall& wall, const Tile& tile,
+           const SurfaceTile& surface, RadianceTile& radiance);
 
 /// The wet layer's reflection adds more than this share of the pixel's luminance: a specular pixel.
 inline constexpr float kSpecularShare = 0.25f;

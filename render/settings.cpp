@@ -1,12 +1,20 @@
 #include "render/settings.h"
 
 #include "core/fields.h"
+#include "render/path_trace.h"
 
 namespace rugae {
 
 template <typename Visitor>
 void fields(Visitor& v, LensSettings& o) {
   v.flag("vignetting", o.vignetting);
+}
+
+template <typename Visitor>
+void fields(Visitor& v, LightSettings& o) {
+  v.number("bounces", o.bounces, 0, kMostBounces);
+  v.number("samples", o.samples, 1, kMostPaths);
+  v.flag("roulette", o.roulette);
 }
 
 template <typename Visitor>
@@ -24,6 +32,7 @@ void fields(Visitor& v, SensorSettings& o) {
 template <typename Visitor>
 void fields(Visitor& v, RenderSettings& o) {
   v.section("lens", o.lens);
+  v.section("light", o.light);
   v.section("sensor", o.sensor);
   v.flag("labels", o.labels);
 }

@@ -14,8 +14,15 @@ struct LensSettings {
   bool vignetting = true;
 };
 
+struct LightSettings {
+  int bounces = 0;       // of light between walls, before it comes to the camera
+  int samples = 16;      // paths a pixel, where there are bounces
+  bool roulette = true;  // long paths end by chance, without bias
+};
+
 struct RenderSettings {
   LensSettings lens;
+  LightSettings light;
   SensorSettings sensor;
   OutputSettings output;
   bool labels = true;  // truth images

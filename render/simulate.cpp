@@ -132,7 +132,7 @@ class FrameLoop {
     const auto i = static_cast<std::size_t>(frame);
     const bool last = i + 1 == track_.size();
     CleanFrame clean = renderer_.render(track_[i].world_from_camera,
-                                        last ? nullptr : &track_[i + 1].world_from_camera, &times);
+                                        last ? nullptr : &track_[i + 1].world_from_camera, &times, frame);
     const double start = thread_seconds();
     const Exposure exposure = sensor_.expose(clean.radiance);
     sensor_s += thread_seconds() - start;
@@ -214,8 +214,12 @@ SimulateResult simulate(const SimulateOptions& options, const std::filesystem::p
 
   progress.begin("frames", todo.size());
   if (!todo.empty()) {
-    const FrameRenderer renderer(scene, camera,
-                                 {options.render.lens.vignetting, options.render.labels});
+    const LightSettings& light = options.render.light;
+    const FrameRenderer renderer(
+        scene, camera,
+        {.vignetting = options.render.lens.vignetting,
+         .labels = options.render.labels,
+         .paths = {light.bounces, light.samples, light.roulette, options.seed}});
     const SensorModel sensor(camera.sensor,
                              {options.render.sensor, trajectory.read_noise_factor, options.seed});
     ExposureLog log(out, exposures);

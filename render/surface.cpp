@@ -52,6 +52,14 @@ void Surface::find_triangle_normals() {
 }
 
 void Surface::look_up(const Tile& tile, const RayTable& rays, SurfaceTile& surface) const {
+  Lanes<float> spread_rad;
+  for (int lane = 0; lane < tile.count; ++lane)
+    spread_rad[lane] = rays.pixel_angle_rad[tile.pixel[lane]];
+  look_up(tile, spread_rad, surface);
+}
+
+void Surface::look_up(const Tile& tile, const Lanes<float>& spread_rad,
+                      SurfaceTile& surface) const {
   surface.count = 0;
   for (int lane = 0; lane < tile.count; ++lane) {
     const Hit& hit = tile.hit[lane];
@@ -76,8 +84,7 @@ void Surface::look_up(const Tile& tile, const RayTable& rays, SurfaceTile& surfa
     query.normal = normal;
     query.region = b0 >= hit.b1 && b0 >= hit.b2 ? a.region : (hit.b1 >= hit.b2 ? b : c).region;
     const float cosine = std::max(kLeastCosine, std::abs(normal.dot(direction)));
-    query.footprint_mm = static_cast<float>(hit.range_mm) * rays.pixel_angle_rad[tile.pixel[lane]] /
-                         std::sqrt(cosine);
+    query.footprint_mm = static_cast<float>(hit.range_mm) * spread_rad[lane] / std::sqrt(cosine);
   }
   const auto n = static_cast<std::size_t>(surface.count);
   if (n > 0) material_({surface.query.data(), n}, {surface.material.data(), n});

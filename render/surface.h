@@ -43,6 +43,9 @@ class Surface {
   const Vec3f& geometric_normal(int triangle) const { return triangle_normals_[triangle]; }
   /// Works out every lane that met the wall.
   void look_up(const Tile& tile, const RayTable& rays, SurfaceTile& surface) const;
+  /// The same for rays that stand for cones of `spread_rad` (square root of the solid angle), by
+  /// lane.
+  void look_up(const Tile& tile, const Lanes<float>& spread_rad, SurfaceTile& surface) const;
 
  private:
   struct Vertex {
