@@ -146,8 +146,8 @@ void PathTracer::trace(std::span<const Emitter> lights, const Wall& wall, const 
           w.from[k] = {placed.position_mm, instant.beat};
         }
         const auto m = static_cast<std::size_t>(places);
-        wall.raycaster().hidden_from({w.from.data(), tile.one_eye ? 1 : m}, {w.point.data(), m},
-                                     {w.lit.data(), m}, {w.hidden.data(), m});
+        wall.raycaster().hidden_from(std::span(w.from.data(), tile.one_eye ? 1 : m),
+                                     {w.point.data(), m}, {w.lit.data(), m}, {w.hidden.data(), m});
         for (int k = 0; k < places; ++k)
           if (w.lit[k] && !w.hidden[k]) w.sum[w.owner[w.surface.lane[k]]] += w.add[k];
       }

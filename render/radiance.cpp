@@ -60,7 +60,7 @@ void add_offset_light(const Emitter& light, const Wall& wall, const Tile& tile,
   }
   const auto n = static_cast<std::size_t>(surface.count);
   if (n == 0) return;
-  wall.raycaster().hidden_from({from.data(), tile.one_eye ? 1 : n}, {point.data(), n},
+  wall.raycaster().hidden_from(std::span(from.data(), tile.one_eye ? 1 : n), {point.data(), n},
                                {lit.data(), n}, {hidden.data(), n});
   for (int k = 0; k < surface.count; ++k) {
     if (!lit[k] || hidden[k]) continue;

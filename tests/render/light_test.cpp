@@ -1,6 +1,8 @@
 // Lights beside the camera: lobe and shadow against closed forms.
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
+
 #include "render/frame.h"
 #include "tests/render/walls.h"
 
