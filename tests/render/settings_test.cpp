@@ -40,8 +40,18 @@ TEST(Settings, MistakesOfTheSensorAreNamedToTheLetter) {
   EXPECT_EQ(change("sensor.bayer=rgbg"),
             "sensor.bayer=rgbg:1:18: bayer is 'rgbg', expected one of: none, rggb, bggr, grbg, "
             "gbrg; did you mean 'rggb'?");
-  EXPECT_EQ(change("sensor.prnu=-1"),
-            "sensor.prnu=-1:1:17: prnu is '-1', expected true or false");
+  EXPECT_EQ(change("sensor.prnu=-1"), "sensor.prnu=-1:1:17: prnu is '-1', expected true or false");
+}
+
+TEST(Settings, MistakesOfTheLightAreNamedToTheLetter) {
+  const auto change = [](const std::string& text) {
+    RenderSettings fresh;
+    return message_of([&] { change_setting(text, fresh); });
+  };
+  EXPECT_EQ(change("light.bounces=-1"), "light.bounces=-1:1:19: bounces is -1, expected 0 to 255");
+  EXPECT_EQ(change("light.samples=0"), "light.samples=0:1:19: samples is 0, expected 1 to 65535");
+  EXPECT_EQ(change("light.bounce=2"),
+            "light.bounce=2:1:10: unknown key 'bounce'; did you mean 'bounces'?");
 }
 
 }  // namespace
