@@ -96,6 +96,11 @@ const YAML::Node* YamlReader::find(const std::string& key) {
 
 bool YamlReader::has(const std::string& key) const { return state_->values.contains(key); }
 
+bool YamlReader::has_mapping(const std::string& key) const {
+  const auto it = state_->values.find(key);
+  return it != state_->values.end() && it->second.IsMap();
+}
+
 void YamlReader::require_key(const std::string& key) {
   state_->asked.push_back(key);
   if (has(key)) return;

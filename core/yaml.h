@@ -34,6 +34,7 @@ class YamlReader {
   YamlReader(const YamlReader&);
 
   bool has(const std::string& key) const;
+  bool has_mapping(const std::string& key) const;  // has it, and its value is a mapping
   void get(const std::string& key, double& value);
   void get(const std::string& key, int& value);
   void get(const std::string& key, std::uint64_t& value);

@@ -90,6 +90,10 @@ void read_deformation(YamlReader yaml, DeformationOptions& options) {
   read_fields(std::move(yaml), options);
 }
 
+std::string deformation_yaml(const DeformationOptions& options) {
+  return json_of_fields(options).dump();
+}
+
 double contraction_profile(double offset_mm, double width_mm) {
   return bump(offset_mm / (kSupport * width_mm));
 }

@@ -26,6 +26,9 @@ struct DeformationOptions {
 /// Keeps what the mapping does not name. Throws Error with file, line and column.
 void read_deformation(YamlReader yaml, DeformationOptions& options);
 
+/// Every option, as a mapping in one line.
+std::string deformation_yaml(const DeformationOptions& options);
+
 /// How strong the contractions are along the organ: 0 before the first length, rising to 1 at the
 /// second, and back to 0 between the last two. Arc lengths of the axis, mm.
 struct PeristalsisZone {

@@ -92,6 +92,7 @@ struct Scene {
   double motion_reach_mm = 0.0;  // no vertex is ever farther from its rest position
   std::uint64_t seed = 1;
   std::vector<std::string> notes;  // of an imported mesh: what was found and done, a line each
+  std::string resolved_yaml;       // the scene's file with every default and every draw filled in
 
   /// Id of the lesion or object that holds a rest position, 0 for none: the rule of
   /// Instances::at, which the colours and the wall's shape follow too.

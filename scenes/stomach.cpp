@@ -3,9 +3,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/check.h"
+#include "core/random.h"
 #include "scenes/isosurface.h"
 #include "scenes/portable_math.h"
 #include "scenes/subdivide.h"
@@ -41,11 +43,82 @@ constexpr std::size_t kCardiaNode = 2, kBodyNode = 4, kIncisuraNode = 6, kAntrum
                       kPylorusNode = 10, kDuodenumNode = 12;
 constexpr double kFlattening = 0.92;  // front to back, of a distended stomach; assumed
 
-std::vector<AxisNode> scaled(const Station* begin, const Station* end, double scale) {
-  std::vector<AxisNode> nodes;
-  for (const Station* s = begin; s != end; ++s)
-    nodes.push_back({scale * Vec3(s->x, s->y, s->z), scale * s->radius});
+// Largest changes that a seed makes; assumed, and such that every stomach stays within 1.2 to 1.8 l
+// and 200 to 300 mm.
+constexpr double kBendTurns = 14.0 / 360.0, kStretch = 0.06, kSwingMm = 5.0;
+constexpr double kWiden = 0.06, kTaper = 0.07, kCanal = 0.15, kVolume = 0.10;
+constexpr double kFoldHeight = 0.2, kFoldSize = 0.1;
+
+// Numbers from -1 to 1, times the variation.
+std::array<double, 4> changes(const StomachOptions& options, std::uint64_t seed,
+                              std::uint64_t index) {
+  auto u = random_uniform(seed, Purpose::scene_draw, 0, index);
+  for (double& v : u) v = options.variation * (2.0 * v - 1.0);
+  return u;
+}
+
+// The product of the balls' sections and their distances: nearly in proportion to the volume.
+double tube_volume(const std::vector<AxisNode>& nodes) {
+  double sum = 0.0;
+  for (std::size_t i = 1; i < nodes.size(); ++i) {
+    const double r = 0.5 * (nodes[i - 1].radius_mm + nodes[i].radius_mm);
+    sum += r * r * (nodes[i].centre - nodes[i - 1].centre).norm();
+  }
+  const double dome = nodes[0].radius_mm;
+  return sum + 2.0 / 3.0 * dome * dome * dome;
+}
+
+double cube_root(double x) {
+  double root = 1.0;
+  for (int step = 0; step < 20; ++step) root -= (root * root * root - x) / (3.0 * root * root);
+  return root;
+}
+
+// Node i of the mean axis moves by the turned and stretched steps before it.
+std::vector<AxisNode> main_axis(const StomachOptions& options, std::uint64_t seed, double& scale,
+                                double& top_radius_mm) {
+  const auto bend = changes(options, seed, 0), width = changes(options, seed, 1);
+  std::vector<AxisNode> mean, nodes;
+  const int last = static_cast<int>(std::size(kAxis)) - 1;
+  for (const Station& s : kAxis) mean.push_back({Vec3(s.x, s.y, s.z), s.radius});
+  nodes = mean;
+  for (int i = 0; i <= last; ++i) {
+    const double along = static_cast<double>(i) / last;
+    nodes[i].radius_mm *=
+        (1.0 + kWiden * width[0]) * (1.0 + kTaper * width[1] * (1.0 - 2.0 * along));
+    if (i >= static_cast<int>(kPylorusNode)) nodes[i].radius_mm *= 1.0 + kCanal * width[2];
+    if (i <= static_cast<int>(kCardiaNode)) continue;
+    // from the body on, the hook opens or closes in the frontal plane and swings to front or back
+    const double hook = smooth_step(2.0, 8.0, static_cast<double>(i));
+    const SineCosine sc = portable_turn(kBendTurns * bend[0] * hook);
+    const Vec3 step = mean[i].centre - mean[i - 1].centre;
+    nodes[i].centre =
+        nodes[i - 1].centre +
+        (1.0 + kStretch * bend[1]) * Vec3(sc.cosine * step.x() + sc.sine * step.z(), step.y(),
+                                          sc.cosine * step.z() - sc.sine * step.x());
+    nodes[i].centre.y() += kSwingMm * bend[2] * (hook - smooth_step(2.0, 8.0, i - 1.0));
+  }
+  scale = options.scale *
+          cube_root(tube_volume(mean) / tube_volume(nodes) * (1.0 + kVolume * width[3]));
+  for (AxisNode& node : nodes) node = {scale * node.centre, scale * node.radius_mm};
+  top_radius_mm = nodes[0].radius_mm;
   return nodes;
+}
+
+std::vector<AxisNode> oesophagus_axis(double scale) {
+  std::vector<AxisNode> nodes;
+  for (const Station& s : kOesophagus)
+    nodes.push_back({scale * Vec3(s.x, s.y, s.z), scale * s.radius});
+  return nodes;
+}
+
+ReliefOptions drawn_relief(const StomachOptions& options, std::uint64_t seed) {
+  const auto change = changes(options, seed, 2);
+  ReliefOptions relief = options.relief;
+  relief.rugae_height_mm *= 1.0 + kFoldHeight * change[0];
+  relief.rugae_spacing_mm *= 1.0 + kFoldSize * change[1];
+  relief.rugae_thickness_mm *= 1.0 + kFoldSize * change[2];
+  return relief;
 }
 
 }  // namespace
@@ -76,16 +149,17 @@ std::string region_name(Region region) {
 
 void StomachOptions::check(const std::string& where) const {
   rugae::check(scale >= 0.3 && scale <= 2.0, "{}: scale is {}, expected 0.3 to 2", where, scale);
+  rugae::check(variation >= 0.0 && variation <= 1.0, "{}: variation is {}, expected 0 to 1", where,
+               variation);
   relief.check(where);
   instances.check(where);
 }
 
-StomachShape::StomachShape(double scale)
-    : scale_(scale),
-      axis_(scaled(std::begin(kAxis), std::end(kAxis), scale), 6.0 * scale, 4.0 * scale,
+StomachShape::StomachShape(const StomachOptions& options, std::uint64_t seed)
+    : scale_(options.scale),
+      axis_(main_axis(options, seed, scale_, top_radius_mm_), 6.0 * scale_, 4.0 * scale_,
             kFlattening, Vec3::UnitY()),
-      oesophagus_(scaled(std::begin(kOesophagus), std::end(kOesophagus), scale), 4.0 * scale,
-                  2.0 * scale, 1.0, Vec3::UnitY()) {}
+      oesophagus_(oesophagus_axis(scale_), 4.0 * scale_, 2.0 * scale_, 1.0, Vec3::UnitY()) {}
 
 double StomachShape::distance_mm(const Vec3& p, Vec3* gradient) const {
   Vec3 g0, g1;
@@ -130,7 +204,7 @@ PeristalsisZone StomachShape::peristalsis_zone() const {
 Eigen::AlignedBox3d StomachShape::box() const { return axis_.box().merged(oesophagus_.box()); }
 
 double StomachShape::length_mm() const {
-  return scale_ * kAxis[0].radius + axis_.node_s_mm(kPylorusNode + 1);
+  return top_radius_mm_ + axis_.node_s_mm(kPylorusNode + 1);
 }
 
 namespace {
@@ -159,8 +233,8 @@ PlaceOnWall place_on(const StomachShape& shape, const Relief& relief) {
 }  // namespace
 
 StomachWall make_stomach(const StomachOptions& options, std::uint64_t seed, double cell_mm) {
-  const StomachShape shape(options.scale);
-  const Relief relief(options.relief, shape.fold_zone(), shape.axis(), seed);
+  const StomachShape shape(options, seed);
+  const Relief relief(drawn_relief(options, seed), shape.fold_zone(), shape.axis(), seed);
   constexpr int kRelaxRounds = 6;
   StomachWall wall;
   wall.mesh = isosurface([&](const Vec3& p, Vec3* g) { return shape.distance_mm(p, g); },

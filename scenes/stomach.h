@@ -12,7 +12,8 @@
 namespace rugae {
 
 struct StomachOptions {
-  double scale = 1.0;  // of all lengths of the smooth shape; 1: about 1.5 l
+  double scale = 1.0;      // of all lengths of the smooth shape; 1: about 1.5 l
+  double variation = 1.0;  // how far a seed's stomach may be from the mean one, 0 to 1
   ReliefOptions relief;
   InstanceOptions instances;
   void check(const std::string& where) const;
@@ -22,7 +23,10 @@ struct StomachOptions {
 /// origin. Lengths in mm.
 class StomachShape {
  public:
-  explicit StomachShape(double scale);
+  /// The mean stomach, bent, stretched and widened as the seed draws it: the hook of the J by up to
+  /// 14 degrees, its length by 6 %, its calibre by 6 % as a whole and 7 % from one end to the other
+  /// (the pyloric canal by 15 %), its volume by 10 %; assumed.
+  StomachShape(const StomachOptions& options, std::uint64_t seed);
   double distance_mm(const Vec3& p, Vec3* gradient = nullptr) const;
   /// Coordinates along and around the main axis, fundus to duodenum.
   AxisPoint locate(const Vec3& p) const { return axis_.locate(p); }
@@ -35,7 +39,7 @@ class StomachShape {
   double length_mm() const;
 
  private:
-  double scale_;
+  double scale_, top_radius_mm_;  // of the dome of the fundus
   OrganAxis axis_, oesophagus_;
 };
 
@@ -45,8 +49,9 @@ struct StomachWall {
   std::vector<WallInstance> instances;
 };
 
-/// `cell_mm` sets the triangle size: about 3 area / cell^2 triangles. The same seed gives the same
-/// surface at every cell size. Throws Error when the lesions and objects find no room.
+/// `cell_mm` sets the triangle size: about 3 area / cell^2 triangles. The seed draws the shape, the
+/// folds (height by up to 20 %, spacing and thickness by 10 %) and what lies on them; it gives the
+/// same surface at every cell size. Throws Error when the lesions and objects find no room.
 StomachWall make_stomach(const StomachOptions& options, std::uint64_t seed, double cell_mm);
 
 }  // namespace rugae

@@ -64,7 +64,7 @@ const StomachWall& coarse() {
   return wall;
 }
 OrganMotion stomach_motion(const DeformationOptions& options) {
-  const StomachShape shape(1.0);
+  const StomachShape shape({}, 1);
   return make_motion(options, shape.peristalsis_zone(), shape.axis(), coarse().mesh.vertices);
 }
 
@@ -135,7 +135,7 @@ TEST(Peristalsis, AContractionHasTheStatedWidth) {
 // On the stomach: the depth below rest grows from the body to the antrum, where it is the stated
 // amplitude, and the stated occlusion is reached before the pylorus.
 TEST(Peristalsis, GrowsFromTheBodyToTheAntrumOfTheStomach) {
-  const StomachShape shape(1.0);
+  const StomachShape shape({}, 1);
   const PeristalsisZone zone = shape.peristalsis_zone();
   const std::vector<Vec3>& rest = coarse().mesh.vertices;
   const OrganMotion motion = stomach_motion(peristalsis());
@@ -221,7 +221,7 @@ TEST(Deformation, TheWallStaysAWallAtEveryPhase) {
 }
 
 TEST(Deformation, FoldsAtFullDetailDoNotPassThroughEachOtherEither) {
-  const StomachShape shape(1.0);
+  const StomachShape shape({}, 1);
   TriangleMesh wall = make_stomach({}, 1, 0.96).mesh;
   const OrganMotion motion =
       make_motion(both(), shape.peristalsis_zone(), shape.axis(), wall.vertices);

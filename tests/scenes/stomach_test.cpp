@@ -75,14 +75,17 @@ TEST(Stomach, NormalsPointOutOfTheLumen) {
 
 TEST(Stomach, HasTheSizeOfADistendedStomach) {
   constexpr double kMl = 1000.0;
-  EXPECT_NEAR(signed_volume_mm3(medium().mesh) / kMl, 1500.0, 75.0);  // about 1.5 l
-  const StomachShape shape(1.0);
+  StomachOptions mean;
+  mean.variation = 0.0;
+  const StomachWall wall = make_stomach(mean, 1, kCoarseMm);
+  EXPECT_NEAR(signed_volume_mm3(wall.mesh) / kMl, 1500.0, 75.0);  // about 1.5 l
+  const StomachShape shape(mean, 1);
   EXPECT_GE(shape.length_mm(), 200.0);
   EXPECT_LE(shape.length_mm(), 300.0);
-  const double longest = bounding_box(medium().mesh).sizes().maxCoeff();
+  const double longest = bounding_box(wall.mesh).sizes().maxCoeff();
   EXPECT_GE(longest, 200.0);
   EXPECT_LE(longest, 300.0);
-  StomachOptions small;
+  StomachOptions small = mean;
   small.scale = 0.5;
   EXPECT_NEAR(signed_volume_mm3(make_stomach(small, 1, 1.5).mesh) / kMl, 1500.0 / 8.0, 25.0);
 }
@@ -95,7 +98,7 @@ double height_at(const StomachShape& shape, const Vec3& vertex) {
 }
 
 TEST(Stomach, FoldsAreStrongOnTheGreaterCurvatureOfTheBodyAndFadeElsewhere) {
-  const StomachShape shape(1.0);
+  const StomachShape shape({}, 1);
   const StomachWall& wall = medium();
   std::map<std::string, std::pair<double, int>> squares;
   for (std::size_t v = 0; v < wall.mesh.vertices.size(); ++v) {
@@ -125,7 +128,7 @@ TEST(Stomach, FoldsAreStrongOnTheGreaterCurvatureOfTheBodyAndFadeElsewhere) {
 TEST(Stomach, FoldsAreThreeToFiveMillimetresThick) {
   // Walk around the body over the greater curvature, and measure the mesh's height every 0.25 mm;
   // a fold is a stretch above half of its own crest, its thickness the length of that stretch.
-  const StomachShape shape(1.0);
+  const StomachShape shape({}, 1);
   const ClosestPoint closest(medium().mesh);
   std::vector<double> thickness_mm, crest_mm;
   for (double level = -60.0; level <= 0.0; level += 4.0) {
@@ -176,7 +179,7 @@ TEST(Stomach, FoldsAreThreeToFiveMillimetresThick) {
 }
 
 TEST(Stomach, RegionsLieWhereAnAnatomistLooksForThem) {
-  const StomachShape shape(1.0);
+  const StomachShape shape({}, 1);
   const StomachWall& wall = coarse();
   struct Mean {
     Vec3 p = Vec3::Zero();
@@ -196,7 +199,7 @@ TEST(Stomach, RegionsLieWhereAnAnatomistLooksForThem) {
     m.p /= m.count;
     m.s_mm /= m.count;
     m.cos_greater /= m.count;
-    EXPECT_GE(m.count, 100) << region_name(region);
+    EXPECT_GE(m.count, 70) << region_name(region);  // the mean canal has 100, a drawn one less
   }
   EXPECT_EQ(means.count(Region::unknown), 0u);
   for (const Region r : {Region::cardia, Region::fundus, Region::body, Region::incisura,
@@ -228,7 +231,7 @@ TEST(Stomach, RegionsLieWhereAnAnatomistLooksForThem) {
 TEST(Stomach, TheLesserCurvatureIsNotchedAndTheGreaterIsNot) {
   // In the frontal plane, the way along the lesser curvature bends by more than the way along the
   // greater curvature is wide: compare the lengths of both from the level of the cardia.
-  const StomachShape shape(1.0);
+  const StomachShape shape({}, 1);
   const FoldZone zone = shape.fold_zone();
   std::map<int, Vec3> lesser, greater;
   for (std::size_t v = 0; v < coarse().mesh.vertices.size(); ++v) {
@@ -258,14 +261,48 @@ TEST(Stomach, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
   EXPECT_EQ(alone.regions, coarse().regions);
 }
 
+TEST(Stomach, EverySeedGivesAnotherStomachWithinAnatomicalBounds) {
+  std::vector<double> volumes_ml, lengths_mm, pylorus_x_mm;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const StomachWall wall = make_stomach({}, seed, kCoarseMm);
+    const StomachShape shape({}, seed);
+    const EdgeReport edges = inspect_edges(wall.mesh);
+    EXPECT_TRUE(edges.closed() && edges.flipped == 0) << seed;
+    EXPECT_EQ(wall.mesh.vertices.size() - wall.mesh.triangles.size() / 2, 2u) << seed;
+    EXPECT_EQ(self_intersections(wall.mesh), 0) << seed;
+    volumes_ml.push_back(signed_volume_mm3(wall.mesh) / 1000.0);
+    lengths_mm.push_back(shape.length_mm());
+    Vec3 sum = Vec3::Zero();
+    int count = 0;
+    for (std::size_t v = 0; v < wall.mesh.vertices.size(); ++v)
+      if (wall.regions[v] == Region::pylorus) {
+        sum += wall.mesh.vertices[v];
+        ++count;
+      }
+    ASSERT_GE(count, 20) << seed;
+    pylorus_x_mm.push_back(sum.x() / count);
+    EXPECT_TRUE(volumes_ml.back() >= 1200.0 && volumes_ml.back() <= 1800.0) << volumes_ml.back();
+    EXPECT_TRUE(lengths_mm.back() >= 200.0 && lengths_mm.back() <= 300.0) << lengths_mm.back();
+  }
+  const auto spread = [](const std::vector<double>& v) {
+    return *std::ranges::max_element(v) - *std::ranges::min_element(v);
+  };
+  EXPECT_GE(spread(volumes_ml), 50.0);
+  EXPECT_GE(spread(lengths_mm), 5.0);
+  EXPECT_GE(spread(pylorus_x_mm), 5.0);
+}
+
 TEST(Stomach, AnotherSeedGivesOtherFoldsOfTheSameStrength) {
-  const StomachShape shape(1.0);
-  const StomachWall other = make_stomach({}, 2, kCoarseMm);
-  ASSERT_EQ(other.mesh.vertices.size(), coarse().mesh.vertices.size());  // the same smooth shape
+  StomachOptions mean;
+  mean.variation = 0.0;
+  const StomachShape shape(mean, 1);
+  const StomachWall one = make_stomach(mean, 1, kCoarseMm),
+                    other = make_stomach(mean, 2, kCoarseMm);
+  ASSERT_EQ(other.mesh.vertices.size(), one.mesh.vertices.size());  // the same smooth shape
   double a = 0.0, b = 0.0, ab = 0.0;
   for (std::size_t v = 0; v < other.mesh.vertices.size(); ++v) {
     if (other.regions[v] != Region::body) continue;
-    const double ha = height_at(shape, coarse().mesh.vertices[v]);
+    const double ha = height_at(shape, one.mesh.vertices[v]);
     const double hb = height_at(shape, other.mesh.vertices[v]);
     a += ha * ha;
     b += hb * hb;
@@ -290,7 +327,7 @@ TEST(Stomach, ResolutionsSampleTheSameSurface) {
 }
 
 TEST(Stomach, AreaeAreFineShallowAndPolygonal) {
-  const StomachShape shape(1.0);
+  const StomachShape shape({}, 1);
   StomachOptions options;
   options.relief.rugae_height_mm = 0.0;
   const StomachWall wall = make_stomach(options, 1, kMediumMm);

@@ -95,6 +95,19 @@ TEST(Plan, FillsTheProceduralStomach) {
   const Scene scene = load_scene({"stomach", 1, "coarse"});
   check_styles(check_all(scene.wall, 1));
 }
+TEST(Plan, FillsTheStomachsOfOtherSeeds) {
+  constexpr double kShare = 1e-3;
+  for (const std::uint64_t seed : {2u, 3u, 4u, 5u}) {
+    const Scene scene = load_scene({"stomach", seed, "coarse"});
+    for (const char* name : {"1", "2", "3", "4", "6"}) {
+      const TrajectoryOptions options = load_trajectory(name);
+      const PlannedPath path = plan_path(scene.wall, options, seed);
+      EXPECT_TRUE(std::abs(path.length_mm() / (10.0 * options.length_cm) - 1.0) <= kShare)
+          << "seed " << seed << ", trajectory " << name << ": " << path.length_mm();
+      EXPECT_TRUE(path.min_clearance_mm() >= options.clearance_mm);
+    }
+  }
+}
 TEST(RealDataPlan, FillsTheBodyParts3dStomach) {
   const std::filesystem::path file = RUGAE_SHARED_DATA "/meshes/stomach_bodyparts3d_FMA7148.ply";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not here";

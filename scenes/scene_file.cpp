@@ -1,0 +1,237 @@
+#include "scenes/scene_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/check.h"
+#include "core/random.h"
+#include "core/yaml.h"
+#include "scenes/portable_math.h"
+
+namespace rugae {
+namespace {
+
+// Every section's keys, once: for reading and for writing.
+template <typename Visitor>
+void keys(Visitor& v, ReliefOptions& o) {
+  v("rugae_height_mm", o.rugae_height_mm);
+  v("rugae_thickness_mm", o.rugae_thickness_mm);
+  v("rugae_spacing_mm", o.rugae_spacing_mm);
+  v("areae_size_mm", o.areae_size_mm);
+  v("areae_depth_mm", o.areae_depth_mm);
+}
+template <typename Visitor>
+void keys(Visitor& v, MucosaOptions& o) {
+  v("base_albedo", o.base_albedo);
+  v("vessel_contrast", o.vessel_contrast);
+  v("mottle_contrast", o.mottle_contrast);
+  v("wetness", o.wetness);
+  v("oil", o.oil);
+}
+struct Lesions {
+  InstanceOptions& of;
+};
+template <typename Visitor>
+void keys(Visitor& v, Lesions& o) {
+  v("polyp", o.of.polyp);
+  v("ulcer", o.of.ulcer);
+  v("erosion", o.of.erosion);
+  v("bleeding", o.of.bleeding);
+  v("angiectasia", o.of.angiectasia);
+}
+struct Objects {
+  InstanceOptions& of;
+};
+template <typename Visitor>
+void keys(Visitor& v, Objects& o) {
+  v("debris", o.of.debris);
+  v("bubbles", o.of.bubbles);
+  v("mucus", o.of.mucus);
+}
+struct Shape {
+  StomachOptions& of;
+};
+template <typename Visitor>
+void keys(Visitor& v, Shape& o) {
+  v("scale", o.of.scale);
+  v("variation", o.of.variation);
+}
+
+// FNV-1a (Fowler, Noll, Vo): a number for a path such as "mucosa.wetness".
+std::uint64_t path_number(const std::string& path) {
+  std::uint64_t h = 0xcbf29ce484222325ull;
+  for (const char c : path) h = (h ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
+  return h;
+}
+
+// Reads values, and draws those that are given as distributions.
+struct DrawingReader {
+  YamlReader& yaml;
+  std::string section;  // with its dot
+  std::uint64_t seed;
+
+  void operator()(const char* key, Vec3& value) { yaml.get(key, value); }
+  void operator()(const char* key, double& value) {
+    if (yaml.has_mapping(key))
+      value = drawn(key, false);
+    else
+      yaml.get(key, value);
+  }
+  void operator()(const char* key, int& value) {
+    if (yaml.has_mapping(key))
+      value = static_cast<int>(drawn(key, true));
+    else
+      yaml.get(key, value);
+  }
+
+ private:
+  double drawn(const char* key, bool whole) {
+    YamlReader of = *yaml.child(key);
+    const std::string where = yaml.where(key);
+    const int forms = of.has("uniform") + of.has("normal") + of.has("choice");
+    Vec2 pair;
+    std::vector<double> list;
+    of.get("uniform", pair);
+    of.get("normal", pair);
+    of.get("choice", list);
+    of.finish();
+    check(forms == 1, "{}: {} has {} distributions, expected one of: uniform, normal, choice",
+          where, key, forms);
+    const std::uint64_t index = path_number(section + key);
+    double value = 0.0;
+    if (of.has("uniform")) {
+      check(pair[0] <= pair[1], "{}: uniform is [{}, {}], expected the least value first",
+            of.where("uniform"), pair[0], pair[1]);
+      const double u = random_uniform(seed, Purpose::scene_draw, 1, index)[0];
+      value = pair[0] + u * (pair[1] - pair[0] + (whole ? 1.0 : 0.0));
+      if (whole) value = std::min(std::floor(value), pair[1]);
+    } else if (of.has("normal")) {
+      check(pair[1] >= 0.0, "{}: normal is [{}, {}], expected a deviation of at least 0",
+            of.where("normal"), pair[0], pair[1]);
+      // Box and Muller, until it lies within two deviations
+      double z = 3.0;
+      for (std::uint32_t attempt = 1; std::abs(z) > 2.0; ++attempt) {
+        const auto u = random_uniform(seed, Purpose::scene_draw, attempt, index);
+        z = std::sqrt(-2.0 * portable_log(u[0])) * portable_turn(u[1]).cosine;
+      }
+      value = pair[0] + z * pair[1];
+      if (whole) value = std::max(0.0, std::floor(value + 0.5));
+    } else {
+      check(!list.empty(), "{}: choice is empty, expected at least one value", of.where("choice"));
+      const double u = random_uniform(seed, Purpose::scene_draw, 1, index)[0];
+      value = list[std::min(list.size() - 1,
+                            static_cast<std::size_t>(u * static_cast<double>(list.size())))];
+      check(!whole || value == std::floor(value), "{}: {} is {}, expected a whole number",
+            of.where("choice"), key, value);
+    }
+    return value;
+  }
+};
+
+struct Writer {
+  std::string text, indent;
+  void operator()(const char* key, const Vec3& v) {
+    text += fmt::format("{}{}: [{}, {}, {}]\n", indent, key, v.x(), v.y(), v.z());
+  }
+  template <typename Number>
+  void operator()(const char* key, const Number& value) {
+    text += fmt::format("{}{}: {}\n", indent, key, value);
+  }
+  template <typename Section>
+  void section(const char* name, Section section) {
+    text += fmt::format("{}:\n", name);
+    indent = "  ";
+    keys(*this, section);
+    indent.clear();
+  }
+};
+
+constexpr const char* kWallNormals[] = {"auto", "outward", "inward"};
+constexpr const char* kOpenEnds[] = {"cap", "refuse"};
+
+template <typename Section>
+void read_section(YamlReader& yaml, const char* name, std::uint64_t seed, Section section) {
+  auto child = yaml.child(name);
+  if (!child) return;
+  DrawingReader reader{*child, std::string(name) + ".", seed};
+  keys(reader, section);
+  child->finish();
+}
+
+void read_import(YamlReader& yaml, SceneFile& scene, const std::filesystem::path& file) {
+  std::string mesh;
+  yaml.require("mesh", mesh);
+  scene.mesh = file.parent_path() / mesh;  // an absolute path stays itself
+  yaml.get("mm_per_unit", scene.import.mm_per_unit);
+  int wall = 0, ends = 0;
+  yaml.get_choice("wall_normals", {std::begin(kWallNormals), std::end(kWallNormals)}, wall);
+  scene.import.wall = static_cast<WallNormals>(wall);
+  yaml.get_choice("open_ends", {std::begin(kOpenEnds), std::end(kOpenEnds)}, ends);
+  scene.import.open_ends = static_cast<OpenEnds>(ends);
+  yaml.get("component", scene.import.component);
+  yaml.get("target_edge_mm", scene.import.target_edge_mm);
+  yaml.get("with_relief", scene.import.with_relief);
+  scene.import.check(file.string());
+}
+
+}  // namespace
+
+SceneFile read_scene_file(const std::filesystem::path& file, std::uint64_t seed) {
+  YamlReader yaml = YamlReader::from_file(file);
+  SceneFile scene;
+  int kind = 0;
+  yaml.get_choice("kind", {"procedural", "mesh"}, kind);
+  scene.kind = static_cast<SceneKind>(kind);
+  if (scene.kind == SceneKind::mesh) {
+    read_import(yaml, scene, file);
+    for (const char* key : {"lesions", "objects"})
+      check(!yaml.has(key), "{}: {} need a stomach of kind procedural", yaml.where(key), key);
+  } else {
+    DrawingReader reader{yaml, "", seed};
+    Shape shape{scene.stomach};
+    keys(reader, shape);
+    read_section(yaml, "lesions", seed, Lesions{scene.stomach.instances});
+    read_section(yaml, "objects", seed, Objects{scene.stomach.instances});
+  }
+  read_section<ReliefOptions&>(yaml, "relief", seed, scene.stomach.relief);
+  scene.import.relief = scene.stomach.relief;
+  scene.stomach.relief.check(file.string() + ": relief");
+  read_section<MucosaOptions&>(yaml, "mucosa", seed, scene.mucosa);
+  scene.mucosa.check(file.string() + ": mucosa");
+  if (auto deformation = yaml.child("deformation")) {
+    read_deformation(*deformation, scene.deformation);
+    scene.deformation.check(file.string() + ": deformation");
+  }
+  yaml.finish();
+  scene.stomach.check(file.string());
+  return scene;
+}
+
+std::string resolved_yaml(const SceneFile& scene) {
+  SceneFile all = scene;
+  Writer writer;
+  if (scene.kind == SceneKind::mesh) {
+    const ImportOptions& o = scene.import;
+    writer.text = fmt::format(
+        "kind: mesh\nmesh: {}\nmm_per_unit: {}\nwall_normals: {}\nopen_ends: {}\ncomponent: {}\n"
+        "target_edge_mm: {}\nwith_relief: {}\n",
+        scene.mesh.generic_string(), o.mm_per_unit, kWallNormals[static_cast<int>(o.wall)],
+        kOpenEnds[static_cast<int>(o.open_ends)], o.component, o.target_edge_mm, o.with_relief);
+  } else {
+    writer.text = "kind: procedural\n";
+    Shape shape{all.stomach};
+    keys(writer, shape);
+  }
+  writer.section("relief", all.stomach.relief);
+  writer.section("mucosa", all.mucosa);
+  if (scene.kind == SceneKind::procedural) {
+    writer.section("lesions", Lesions{all.stomach.instances});
+    writer.section("objects", Objects{all.stomach.instances});
+  }
+  writer.text += "deformation: " + deformation_yaml(scene.deformation) + "\n";
+  return writer.text;
+}
+
+}  // namespace rugae

@@ -1,0 +1,35 @@
+#pragma once
+// The YAML file of a scene: reading it, drawing what it leaves to chance, writing what came out.
+
+#include <filesystem>
+#include <string>
+
+#include "scenes/deformation.h"
+#include "scenes/import.h"
+#include "scenes/stomach.h"
+
+namespace rugae {
+
+enum class SceneKind { procedural, mesh };
+
+struct SceneFile {
+  SceneKind kind = SceneKind::procedural;
+  StomachOptions stomach;
+  ImportOptions import;
+  std::filesystem::path mesh;
+  MucosaOptions mucosa;
+  DeformationOptions deformation;
+};
+
+/// A number of `relief`, `mucosa`, `lesions` or `objects`, `scale` and `variation` may be a
+/// distribution in place of a value:
+///   {uniform: [least, most]}, {normal: [mean, deviation]} (cut off at two deviations),
+///   {choice: [value, ...]} (all alike).
+/// It is drawn by (seed, the key's path), so that no draw depends on what else the file holds.
+/// Throws Error with file, line and column.
+SceneFile read_scene_file(const std::filesystem::path& file, std::uint64_t seed);
+
+/// A file that holds every default and every draw: with the same seed it gives the same scene.
+std::string resolved_yaml(const SceneFile& scene);
+
+}  // namespace rugae
