@@ -6,12 +6,14 @@
 
 #include <cmath>
 #include <filesystem>
+#include <set>
 #include <string>
 
 #include "core/check.h"
 #include "core/files.h"
 #include "core/mesh_io.h"
 #include "core/presets.h"
+#include "core/yaml.h"
 #include "self_intersection.h"
 
 namespace rugae {
@@ -332,6 +334,76 @@ TEST_F(SceneFiles, AWrongUnitIsNoticedAndTheRightOneSuggested) {
                                   "with_relief: false\n"));
   EXPECT_NEAR(signed_volume_mm3(load(scaled).wall) / signed_volume_mm3(icosahedron(60.0)), 1.0,
               0.02);
+}
+
+TEST_F(SceneFiles, ValuesAreDrawnBySeedAndKept) {
+  const auto file = write("drawn.yaml", std::string(R"(mucosa:
+  wetness: {uniform: [0.3, 0.8]}
+  vessel_contrast: {normal: [0.4, 0.1]}
+  mottle_contrast: {choice: [0.1, 0.2]}
+relief: {areae_size_mm: {uniform: [2, 4]}}
+lesions: {erosion: {uniform: [0, 3]}, polyp: {choice: [1, 2]}}
+)"));
+  const auto resolved = [&](std::uint64_t seed) {
+    return YamlReader::from_text(
+        load_scene({.name_or_path = file, .seed = seed, .resolution = "coarse", .oil = 0.0})
+            .resolved_yaml,
+        "resolved");
+  };
+  std::set<double> wet;
+  std::set<int> erosions;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    YamlReader yaml = resolved(seed), mucosa = *yaml.child("mucosa"),
+               lesions = *yaml.child("lesions");
+    double wetness = 0.0, vessels = 0.0, mottle = 0.0;
+    int erosion = -1, polyp = -1;
+    mucosa.require("wetness", wetness);
+    mucosa.require("vessel_contrast", vessels);
+    mucosa.require("mottle_contrast", mottle);
+    lesions.require("erosion", erosion);
+    lesions.require("polyp", polyp);
+    EXPECT_TRUE(wetness >= 0.3 && wetness <= 0.8) << wetness;
+    EXPECT_TRUE(vessels >= 0.2 && vessels <= 0.6) << vessels;  // two deviations
+    EXPECT_TRUE(mottle == 0.1 || mottle == 0.2) << mottle;
+    EXPECT_TRUE(erosion >= 0 && erosion <= 3) << erosion;
+    EXPECT_TRUE(polyp == 1 || polyp == 2) << polyp;
+    wet.insert(wetness);
+    erosions.insert(erosion);
+  }
+  EXPECT_EQ(wet.size(), 6u);
+  EXPECT_GE(erosions.size(), 2u);
+  // what was drawn, read again with the same seed, is the same scene
+  const Scene scene = load(file);
+  const Scene again = load(write("again.yaml", scene.resolved_yaml));
+  EXPECT_EQ(again.resolved_yaml, scene.resolved_yaml);
+  EXPECT_EQ(again.wall.vertices, scene.wall.vertices);
+  const Vec3f p = scene.wall.vertices[100].cast<float>(), n = scene.wall.normals[100];
+  EXPECT_EQ(again.mucosa.sample(p, n, Region::body, 0.1f).albedo,
+            scene.mucosa.sample(p, n, Region::body, 0.1f).albedo);
+}
+
+TEST_F(SceneFiles, WrongDistributionsAreToldInOneLine) {
+  const auto error = [&](const std::string& value) {
+    return error_of(write("wrong.yaml", "mucosa:\n  wetness: " + value + "\n"))
+        .substr(path("wrong.yaml").size());
+  };
+  EXPECT_EQ(error("{uniform: [0.8, 0.3]}"),
+            ":2:22: uniform is [0.8, 0.3], expected the least value first");
+  EXPECT_EQ(error("{uniform: [0.1, 0.3], choice: [0.2]}"),
+            ":2:12: wetness has 2 distributions, expected one of: uniform, normal, choice");
+  EXPECT_EQ(error("{}"),
+            ":2:12: wetness has 0 distributions, expected one of: uniform, normal, choice");
+  EXPECT_EQ(error("{uniforn: [0.1, 0.3]}"),
+            ":2:13: unknown key 'uniforn'; did you mean 'uniform'?");
+  EXPECT_EQ(error("{normal: [0.5, -1]}"),
+            ":2:21: normal is [0.5, -1], expected a deviation of at least 0");
+  EXPECT_EQ(error("{choice: []}"), ":2:21: choice is empty, expected at least one value");
+  EXPECT_EQ(error("{uniform: [2, 3]}").substr(0, 21), ": mucosa: wetness is ");
+  EXPECT_EQ(error_of(write("w.yaml", std::string("lesions: {polyp: {choice: [1.5]}}\n")))
+                .substr(path("w.yaml").size()),
+            ":1:27: polyp is 1.5, expected a whole number");
+  EXPECT_EQ(error_of(write("v.yaml", std::string("variation: 2\n"))),
+            path("v.yaml") + ": variation is 2, expected 0 to 1");
 }
 
 TEST_F(SceneFiles, TheExampleIsValidAndShowsTheDefaults) {
