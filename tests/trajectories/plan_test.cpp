@@ -12,6 +12,7 @@
 #include "core/mesh_io.h"
 #include "core/units.h"
 #include "scenes/scene.h"
+#include "scenes/stomach.h"
 #include "tests/trajectories/cavities.h"
 
 namespace rugae {
@@ -91,15 +92,16 @@ void check_styles(const std::map<std::string, PoseTrack>& tracks) {
 
 TEST(Plan, FillsAnEllipsoid) { check_styles(check_all(test_ellipsoid(), 1)); }
 TEST(Plan, FillsABentTube) { check_styles(check_all(test_tube(), 1)); }
-TEST(Plan, FillsTheProceduralStomach) {
-  const Scene scene = load_scene({"stomach", 1, "coarse"});
-  check_styles(check_all(scene.wall, 1));
+TEST(Plan, FillsTheMeanStomach) {
+  StomachOptions mean;
+  mean.variation = 0.0;
+  check_styles(check_all(make_stomach(mean, 1, 2.12).mesh, 1));
 }
 TEST(Plan, FillsTheStomachsOfOtherSeeds) {
   constexpr double kShare = 1e-3;
-  for (const std::uint64_t seed : {2u, 3u, 4u, 5u}) {
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u, 5u}) {
     const Scene scene = load_scene({"stomach", seed, "coarse"});
-    for (const char* name : {"1", "2", "3", "4", "6"}) {
+    for (const char* name : {"2", "4", "6"}) {
       const TrajectoryOptions options = load_trajectory(name);
       const PlannedPath path = plan_path(scene.wall, options, seed);
       EXPECT_TRUE(std::abs(path.length_mm() / (10.0 * options.length_cm) - 1.0) <= kShare)
