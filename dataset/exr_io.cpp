@@ -31,17 +31,15 @@ std::vector<std::string> channel_names(int channels) {
   return {"x", "y", "z"};
 }
 
-OIIO::ImageSpec spec_of(const cv::Mat& image) {
+OIIO::ImageSpec spec_of(const cv::Mat& image, const std::vector<std::string>& names) {
   OIIO::ImageSpec spec(image.cols, image.rows, image.channels(), OIIO::TypeDesc::FLOAT);
-  spec.channelnames = channel_names(image.channels());
+  spec.channelnames = names;
   spec.attribute("compression", kCompression);
   spec.attribute("DateTime", "1970:01:01 00:00:00");  // otherwise the time of writing
   return spec;
 }
 
-}  // namespace
-
-void write_exr(const fs::path& file, const cv::Mat& image) {
+void write(const fs::path& file, const cv::Mat& image, const std::vector<std::string>& names) {
   check(file.extension() == ".exr", "{}: expected the extension .exr", file.string());
   check(!image.empty() && image.depth() == CV_32F && image.channels() <= 3,
         "{}: image of type {}, expected float32 of 1 to 3 channels", file.string(),
@@ -53,7 +51,7 @@ void write_exr(const fs::path& file, const cv::Mat& image) {
   OIIO::Filesystem::IOVecOutput memory(bytes);
   const auto out = OIIO::ImageOutput::create("memory.exr", &memory);
   check(out != nullptr, "{}: cannot be encoded: {}", file.string(), OIIO::geterror());
-  const bool written = out->open("memory.exr", spec_of(image)) &&
+  const bool written = out->open("memory.exr", spec_of(image, names)) &&
                        out->write_image(OIIO::TypeDesc::FLOAT, image.data,
                                         static_cast<OIIO::stride_t>(image.elemSize()),
                                         static_cast<OIIO::stride_t>(image.step[0])) &&
@@ -61,8 +59,6 @@ void write_exr(const fs::path& file, const cv::Mat& image) {
   check(written, "{}: cannot be encoded: {}", file.string(), out->geterror());
   write_atomic(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
-
-namespace {
 
 // `fits` looks at the file's format and channels before its pixels are read.
 template <typename Fits>
@@ -88,6 +84,15 @@ cv::Mat read_checked(const fs::path& file, Fits&& fits) {
 }
 
 }  // namespace
+
+void write_exr(const fs::path& file, const cv::Mat& image) {
+  write(file, image, channel_names(image.channels()));
+}
+
+void write_radiance(const fs::path& file, const cv::Mat& rgb) {
+  check(rgb.type() == CV_32FC3, "{}: radiance must be CV_32FC3", file.string());
+  write(file, rgb, {"R", "G", "B"});
+}
 
 cv::Mat read_exr(const fs::path& file) {
   return read_checked(file, [&file](const OIIO::ImageSpec& spec) {

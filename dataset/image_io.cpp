@@ -17,8 +17,6 @@ namespace rugae {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kJpegQuality = 95;
-
 std::string lower_extension(const fs::path& file) {
   std::string extension = file.extension().string();
   std::ranges::transform(extension, extension.begin(),
@@ -49,7 +47,7 @@ bool has_image_extension(const fs::path& file) {
   return extension == ".png" || extension == ".bmp" || is_jpeg(extension);
 }
 
-void write_image(const fs::path& file, const cv::Mat& image) {
+void write_image(const fs::path& file, const cv::Mat& image, int jpeg_quality) {
   const std::string extension = lower_extension(file);
   check(extension == ".png" || is_jpeg(extension), "{}: images are written as .png or .jpg",
         file.string());
@@ -63,7 +61,7 @@ void write_image(const fs::path& file, const cv::Mat& image) {
     write_atomic(file, encode_png(image));
     return;
   }
-  const std::vector<int> parameters = {cv::IMWRITE_JPEG_QUALITY, kJpegQuality};
+  const std::vector<int> parameters = {cv::IMWRITE_JPEG_QUALITY, jpeg_quality};
   std::vector<unsigned char> bytes;
   bool encoded = false;
   std::string reason;

@@ -8,9 +8,9 @@
 
 namespace rugae {
 
-/// PNG (or JPEG by extension, quality 95), 8-bit one or three channels (BGR); PNG also 16-bit.
-/// Throws Error naming the file.
-void write_image(const std::filesystem::path& file, const cv::Mat& image);
+/// PNG (or JPEG by extension, `jpeg_quality` 1 to 100), 8-bit one or three channels (BGR); PNG also
+/// 16-bit. Throws Error naming the file.
+void write_image(const std::filesystem::path& file, const cv::Mat& image, int jpeg_quality = 95);
 /// 8-bit BGR (CV_8UC3), on the file's own pixel grid (orientation tags are not applied). Throws
 /// Error "...: truncated or not an image" for damaged files: a PNG must be whole to its IEND chunk,
 /// a JPEG must end its last scan with an EOI marker, a BMP must have all its rows; "...: damaged:
@@ -26,6 +26,8 @@ bool has_image_extension(const std::filesystem::path& file);
 /// Float32 EXR of 1, 2 or 3 channels (Y; x y; x y z), lossless. No time stamps: the same pixels
 /// give the same bytes.
 void write_exr(const std::filesystem::path& file, const cv::Mat& image);
+/// Float32 EXR with channels R G B, from CV_32FC3 in RGB; read_any_exr reads it.
+void write_radiance(const std::filesystem::path& file, const cv::Mat& rgb);
 /// CV_32F of as many channels as the file has. Throws Error as above.
 cv::Mat read_exr(const std::filesystem::path& file);
 /// Any OpenEXR file that others wrote: CV_32F of its first channels (four at most), whatever their

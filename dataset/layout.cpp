@@ -12,7 +12,26 @@ std::string numbered(int index, const char* extension) {
 }  // namespace
 
 std::filesystem::path DatasetLayout::frame(int index) const {
+  const std::filesystem::path jpeg = jpeg_frame(index);
+  return std::filesystem::exists(jpeg) ? jpeg : png_frame(index);
+}
+std::filesystem::path DatasetLayout::png_frame(int index) const {
   return frames() / numbered(index, ".png");
+}
+std::filesystem::path DatasetLayout::jpeg_frame(int index) const {
+  return frames() / numbered(index, ".jpg");
+}
+std::filesystem::path DatasetLayout::adc(int index) const {
+  return observations() / "adc" / numbered(index, ".png");
+}
+std::filesystem::path DatasetLayout::mosaic(int index) const {
+  return observations() / "mosaic" / numbered(index, ".png");
+}
+std::filesystem::path DatasetLayout::radiance(int index) const {
+  return truth() / "radiance" / numbered(index, ".exr");
+}
+std::filesystem::path DatasetLayout::clean(int index) const {
+  return truth() / "clean" / numbered(index, ".png");
 }
 std::filesystem::path DatasetLayout::depth(int index) const {
   return truth() / "depth" / numbered(index, ".exr");

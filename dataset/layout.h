@@ -9,7 +9,9 @@
 //     observations/             what a real capsule would give
 //       calibration.yaml        the lens (cameras/camera.h); vignetting is not in it
 //       frames.csv              index,time_s,exposure_s,gain
-//       frames/000000.png       8-bit sRGB
+//       frames/000000.png       8-bit sRGB (or .jpg)
+//       adc/000000.png          on request: the converter's numbers, 16-bit
+//       mosaic/000000.png       on request: the same, one a photosite
 //     truth/
 //       camera.yaml             everything about the camera
 //       trajectory.txt          TUM, world_from_camera, mm
@@ -19,6 +21,8 @@
 //       flow/000000.exr         channels x y: float32 px from frame t to t+1 (absent for the last
 //                               frame), NaN where not kMaskFlowValid
 //       masks/000000.png        bits: see FrameMask
+//       radiance/000000.exr     on request: channels R G B, linear, 1 = full scale
+//       clean/000000.png        on request: the frame from a sensor without faults
 
 #include <filesystem>
 #include <string>
@@ -45,7 +49,12 @@ struct DatasetLayout {
   std::filesystem::path calibration() const { return observations() / "calibration.yaml"; }
   std::filesystem::path frame_list() const { return observations() / "frames.csv"; }
   std::filesystem::path frames() const { return observations() / "frames"; }
+  /// The frame as it is there: JPEG where there is one, else PNG.
   std::filesystem::path frame(int index) const;
+  std::filesystem::path png_frame(int index) const;
+  std::filesystem::path jpeg_frame(int index) const;
+  std::filesystem::path adc(int index) const;
+  std::filesystem::path mosaic(int index) const;
   std::filesystem::path truth() const { return root / "truth"; }
   std::filesystem::path camera() const { return truth() / "camera.yaml"; }
   std::filesystem::path trajectory() const { return truth() / "trajectory.txt"; }
@@ -54,6 +63,8 @@ struct DatasetLayout {
   std::filesystem::path normals(int index) const;
   std::filesystem::path flow(int index) const;
   std::filesystem::path masks(int index) const;
+  std::filesystem::path radiance(int index) const;
+  std::filesystem::path clean(int index) const;
 };
 
 }  // namespace rugae

@@ -53,7 +53,10 @@ Source of_dataset(const fs::path& folder, const fs::path& observations) {
   check(fs::exists(list), "{}: the dataset was not finished (no {}); run the simulation again",
         folder.string(), fs::relative(list, folder).string());
   for (const FrameRecord& record : read_frame_list(list)) {
-    source.files.push_back(observations / "frames" / fmt::format("{:06}.png", source.files.size()));
+    const fs::path frames = observations / "frames";
+    const std::string name = fmt::format("{:06}", source.files.size());
+    const fs::path jpeg = frames / (name + ".jpg"), png = frames / (name + ".png");
+    source.files.push_back(fs::exists(jpeg) ? jpeg : png);
     check(fs::exists(source.files.back()), "{}: missing", source.files.back().string());
     source.times_s.push_back(record.time_s);
   }

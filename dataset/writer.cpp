@@ -127,6 +127,7 @@ DatasetWriter::DatasetWriter(const fs::path& root, const DatasetInfo& info) : in
   }
   make_folder(layout_.frames());
   make_folder(layout_.truth());
+  for (const fs::path& file : image_files(layout_, info.images, 0)) make_folder(file.parent_path());
   if (info.labels)
     for (const fs::path& file :
          {layout_.depth(0), layout_.normals(0), layout_.flow(0), layout_.masks(0)})
@@ -154,13 +155,15 @@ void DatasetWriter::write_scene(const Camera& camera, const PoseTrack& track,
 }
 
 bool DatasetWriter::has_frame(int index) const {
-  if (!fs::exists(layout_.frame(index))) return false;
+  for (const fs::path& file : image_files(layout_, info_.images, index))
+    if (!fs::exists(file)) return false;
   if (!info_.labels) return true;
   return fs::exists(layout_.depth(index)) && fs::exists(layout_.normals(index)) &&
          fs::exists(layout_.masks(index)) && (!has_flow(index) || fs::exists(layout_.flow(index)));
 }
 
-void DatasetWriter::write_frame(int index, const cv::Mat& bgr8, const FrameTruth& truth) const {
+void DatasetWriter::write_frame(int index, const cv::Mat& bgr8, const FrameTruth& truth,
+                                const ExtraImages& extra) const {
   check(index >= 0 && index < info_.frames, "frame {}: the dataset has {} frames", index,
         info_.frames);
   check(bgr8.type() == CV_8UC3 && (width_ == 0 || (bgr8.cols == width_ && bgr8.rows == height_)),
@@ -176,7 +179,7 @@ void DatasetWriter::write_frame(int index, const cv::Mat& bgr8, const FrameTruth
     write_image(layout_.masks(index), truth.masks);
     if (has_flow(index)) write_exr(layout_.flow(index), truth.flow_px);
   }
-  write_image(layout_.frame(index), bgr8);
+  write_images(layout_, info_.images, index, bgr8, extra);
 }
 
 void DatasetWriter::finish(const std::vector<double>& exposure_s,

@@ -10,6 +10,7 @@
 #include "cameras/camera.h"
 #include "core/mesh.h"
 #include "core/pose_track.h"
+#include "dataset/frame_images.h"
 #include "dataset/layout.h"
 #include "dataset/truth.h"
 
@@ -21,8 +22,9 @@ struct DatasetInfo {
   std::uint64_t seed = 1;
   int frames = 0;
   bool labels = true;  // false: no truth images
-  std::string text;    // every option as a canonical JSON object: a folder begun with another text
-                       // is not continued
+  ImageFiles images;
+  std::string text;  // every option as a canonical JSON object: a folder begun with another text
+                     // is not continued
 };
 
 /// The text of dataset.json; throws Error when `info.text` is not JSON.
@@ -45,7 +47,8 @@ class DatasetWriter {
   bool has_frame(int index) const;
   /// Safe to call from several threads for different frames. `bgr8` is the observation. The frame
   /// image itself is published last. Without labels, `truth` is not looked at.
-  void write_frame(int index, const cv::Mat& bgr8, const FrameTruth& truth) const;
+  void write_frame(int index, const cv::Mat& bgr8, const FrameTruth& truth,
+                   const ExtraImages& extra = {}) const;
   /// frames.csv, then the manifest over every file. Only now is the dataset complete. Throws Error
   /// naming the first frame that was not written.
   void finish(const std::vector<double>& exposure_s, const std::vector<double>& gain) const;

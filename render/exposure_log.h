@@ -7,22 +7,22 @@
 #include <map>
 #include <memory>
 
-#include "render/sensor.h"
+#include "render/metering.h"
 
 namespace rugae {
 
 class ExposureLog {
  public:
-  /// What is known of the dataset in `root`: from its frames.csv, or from the log of an unfinished
-  /// run (a half-written last line is ignored).
-  static std::map<int, Exposure> read(const std::filesystem::path& root);
+  /// What is known of the dataset in `root`: from its frames.csv (all exposures; no metering is
+  /// needed then), or from the log of an unfinished run (a half-written last line is ignored).
+  static std::map<int, FrameExposure> read(const std::filesystem::path& root);
 
   /// Starts the log anew with what is known. It has the name of a temporary file: finishing a
   /// dataset removes it.
-  ExposureLog(const std::filesystem::path& root, const std::map<int, Exposure>& known);
+  ExposureLog(const std::filesystem::path& root, const std::map<int, FrameExposure>& known);
   /// Add a frame before its image is published, so that no frame is without its exposure. One
   /// thread at a time.
-  void add(int frame, const Exposure& exposure);
+  void add(int frame, const FrameExposure& exposure);
 
  private:
   struct Close {

@@ -128,17 +128,19 @@ ExposureControl::ExposureControl(const Sensor& sensor, const SensorSettings& set
         settings.exposure_time_s, 1.0 / sensor.fps, sensor.fps);
 }
 
-Exposure ExposureControl::next(int frame, const std::map<int, Exposure>& metered,
-                               const std::map<int, Exposure>& used) const {
+Exposure ExposureControl::next(int frame, const Exposure& metered,
+                               const std::map<int, FrameExposure>& known) const {
   if (settings_.exposure == ExposureMode::fixed) return {settings_.exposure_time_s, settings_.gain};
-  const auto total = [](const std::map<int, Exposure>& known, int of, const char* what) {
-    const auto at = known.find(of);
-    check(at != known.end(), "automatic exposure: frame {} is not {} yet", of, what);
-    return at->second.time_s * at->second.gain;
+  if (settings_.exposure == ExposureMode::per_frame) return metered;
+  const auto earlier = [&](int index) {
+    const auto at = known.find(index);
+    check(at != known.end(), "automatic exposure of frame {}: frame {} is not known", frame, index);
+    return at->second;
   };
-  if (settings_.exposure == ExposureMode::per_frame) return metered.at(frame);
-  const double wanted_s = total(metered, std::max(0, frame - settings_.delay_frames), "metered");
-  const double before_s = frame == 0 ? wanted_s : total(used, frame - 1, "exposed");
+  const auto total = [](const Exposure& exposure) { return exposure.time_s * exposure.gain; };
+  const int seen = std::max(0, frame - settings_.delay_frames);
+  const double wanted_s = total(seen == frame ? metered : earlier(seen).metered);
+  const double before_s = frame == 0 ? wanted_s : total(earlier(frame - 1).used);
   // (wanted / before)^(1 - smoothing), from the quotient that is at most 1
   const double quotient = std::min(wanted_s, before_s) / std::max(wanted_s, before_s);
   const double step =

@@ -17,6 +17,12 @@ struct Exposure {
   bool operator==(const Exposure&) const = default;
 };
 
+/// What the sequence's exposure control must know of a frame.
+struct FrameExposure {
+  Exposure used;
+  Exposure metered;  // what the frame's own brightness asks for
+};
+
 class Metering {
  public:
   explicit Metering(const Sensor& sensor);
@@ -57,10 +63,10 @@ class ExposureControl {
   /// Throws Error when the fixed exposure is longer than a frame lasts.
   ExposureControl(const Sensor& sensor, const SensorSettings& settings);
 
-  /// The exposure of a frame. `metered` and `used` hold what is known of earlier frames; automatic
-  /// exposure needs metered(max(0, t - delay)) and used(t-1), and throws Error without them.
-  Exposure next(int frame, const std::map<int, Exposure>& metered,
-                const std::map<int, Exposure>& used) const;
+  /// The exposure of a frame. `known` holds earlier frames; automatic exposure needs the metering
+  /// of frame max(0, t - delay) and the exposure of t - 1, and throws Error without them.
+  Exposure next(int frame, const Exposure& metered,
+                const std::map<int, FrameExposure>& known) const;
   /// True when the exposure of a frame depends on frames before it.
   bool has_memory() const { return settings_.exposure == ExposureMode::automatic; }
 

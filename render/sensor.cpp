@@ -89,6 +89,19 @@ SensorModel::SensorModel(const Sensor& sensor, const SensorOptions& options)
       adc_top_((1 << sensor.bit_depth) - 1),
       display_(options.chain.tone, sensor.black_level, adc_top_) {}
 
+SensorOptions faultless(SensorOptions options) {
+  SensorSettings& chain = options.chain;
+  chain.noise = chain.prnu = chain.dsnu = false;
+  chain.bayer = Bayer::none;
+  return options;
+}
+
+cv::Mat SensorModel::relative(const cv::Mat& radiance, const Exposure& exposure) const {
+  cv::Mat share;
+  radiance.convertTo(share, CV_32F, exposure.gain * electrons(1.0, exposure) / sensor_.full_well_e);
+  return share;
+}
+
 int SensorModel::adc(float electrons, const Exposure& exposure) const {
   const auto scale =
       static_cast<float>(exposure.gain * (adc_top_ - sensor_.black_level) / sensor_.full_well_e);

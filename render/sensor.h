@@ -43,6 +43,9 @@ class ElectronNoise {
   PoissonTable poisson_;
 };
 
+/// The same chain without its faults: no noise, no fixed patterns, no mosaic.
+SensorOptions faultless(SensorOptions options);
+
 /// What a frame becomes; empty what is not made.
 struct SensorImages {
   cv::Mat bgr;      // CV_8UC3, BGR: the frame as displayed
@@ -59,6 +62,8 @@ class SensorModel {
   double electrons(double radiance, const Exposure& exposure) const {
     return metering_.electrons(radiance, exposure);
   }
+  /// CV_32FC3, RGB: the light in units of the ADC's full scale, not clipped.
+  cv::Mat relative(const cv::Mat& radiance, const Exposure& exposure) const;
   /// The ADC's number for electrons, round half up, clipped to its range.
   int adc(float electrons, const Exposure& exposure) const;
   /// The 8-bit value of an ADC number (without white balance).

@@ -27,6 +27,21 @@ void fields(Visitor& v, SensorSettings& o) {
   v.number("red_gain", o.red_gain, 0.1, 10.0);
   v.number("blue_gain", o.blue_gain, 0.1, 10.0);
   v.choice("tone", o.tone, {"srgb", "gamma22", "linear"});
+  v.choice("exposure", o.exposure, {"per_frame", "fixed", "automatic"});
+  v.number("exposure_time_s", o.exposure_time_s, 1e-6, 1.0);
+  v.number("gain", o.gain, 1.0, 64.0);
+  v.number("delay_frames", o.delay_frames, 0, 100);
+  v.number("smoothing", o.smoothing, 0.0, 0.99);
+}
+
+template <typename Visitor>
+void fields(Visitor& v, OutputSettings& o) {
+  v.choice("frames", o.frames, {"png", "jpeg"});
+  v.number("jpeg_quality", o.jpeg_quality, 1, 100);
+  v.flag("adc", o.adc);
+  v.flag("mosaic", o.mosaic);
+  v.flag("radiance", o.radiance);
+  v.flag("paired", o.paired);
 }
 
 template <typename Visitor>
@@ -34,10 +49,15 @@ void fields(Visitor& v, RenderSettings& o) {
   v.section("lens", o.lens);
   v.section("light", o.light);
   v.section("sensor", o.sensor);
+  v.section("output", o.output);
   v.flag("labels", o.labels);
 }
 
-void RenderSettings::check() const { check_fields(*this, "render"); }
+void RenderSettings::check() const {
+  check_fields(*this, "render");
+  rugae::check(!output.mosaic || sensor.bayer != Bayer::none,
+               "render.output: mosaic is true, but render.sensor.bayer is none");
+}
 
 void read_settings(YamlReader yaml, RenderSettings& settings) {
   read_fields(std::move(yaml), settings);

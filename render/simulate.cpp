@@ -3,8 +3,10 @@
 #include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <condition_variable>
 #include <future>
+#include <memory>
 #include <mutex>
 
 #include "core/check.h"
@@ -61,6 +63,13 @@ DatasetInfo info_of(const SimulateOptions& options, int frames) {
   info.seed = options.seed;
   info.frames = frames;
   info.labels = options.render.labels;
+  const OutputSettings& output = options.render.output;
+  info.images = {output.frames == FrameFormat::jpeg,
+                 output.jpeg_quality,
+                 output.adc,
+                 output.mosaic,
+                 output.radiance,
+                 output.paired};
   info.text = settings_json(options.render);
   return info;
 }
@@ -70,12 +79,23 @@ DatasetInfo info_of(const SimulateOptions& options, int frames) {
 // where threads would idle, so few frames use all threads as well.
 class FrameLoop {
  public:
-  FrameLoop(const FrameRenderer& renderer, const SensorModel& sensor, const DatasetWriter& writer,
-            const PoseTrack& track, ExposureLog* log)
-      : renderer_(renderer), sensor_(sensor), writer_(writer), track_(track), log_(log) {}
+  // Frames before `first_written` are rendered for their metering alone.
+  FrameLoop(const FrameRenderer& renderer, const SensorModel& sensor,
+            const SensorModel& clean_sensor, const ExposureControl& control,
+            const OutputSettings& output, const DatasetWriter& writer, const PoseTrack& track,
+            int first_written, ExposureLog* log)
+      : renderer_(renderer),
+        sensor_(sensor),
+        clean_sensor_(clean_sensor),
+        control_(control),
+        output_(output),
+        writer_(writer),
+        track_(track),
+        first_written_(first_written),
+        log_(log) {}
 
   void run(const std::vector<int>& frames, int threads, Progress& progress,
-           std::map<int, Exposure>& exposures) {
+           std::map<int, FrameExposure>& exposures) {
     exposures_ = &exposures;
     auto done = std::async(std::launch::async, [&] {
       const struct Finished {  // also when an exception leaves the pipeline
@@ -113,52 +133,98 @@ class FrameLoop {
   std::atomic<double> sensor_s = 0.0, encode_s = 0.0, write_s = 0.0;
 
  private:
+  // A frame between its rendering and its file.
+  struct Shot {
+    int frame = 0;
+    CleanFrame clean;
+    FrameExposure exposure;
+  };
+  using ShotPtr = std::shared_ptr<Shot>;
+
+  // Exposure goes through the frames in order: it may follow those before.
   void pipeline(const std::vector<int>& frames, std::size_t in_flight) {
+    using tbb::filter_mode;
     std::size_t next = 0;
-    tbb::parallel_pipeline(in_flight,
-                           tbb::make_filter<void, int>(tbb::filter_mode::serial_in_order,
-                                                       [&](tbb::flow_control& control) {
-                                                         if (next == frames.size() || stop_) {
-                                                           control.stop();
-                                                           return -1;
-                                                         }
-                                                         return frames[next++];
-                                                       }) &
-                               tbb::make_filter<int, void>(tbb::filter_mode::parallel,
-                                                           [&](int frame) { make_frame(frame); }));
+    const auto first =
+        tbb::make_filter<void, int>(filter_mode::serial_in_order, [&](tbb::flow_control& control) {
+          if (next == frames.size() || stop_) {
+            control.stop();
+            return -1;
+          }
+          return frames[next++];
+        });
+    const auto rendered = tbb::make_filter<int, ShotPtr>(filter_mode::parallel,
+                                                         [&](int frame) { return shoot(frame); });
+    const auto exposed =
+        tbb::make_filter<ShotPtr, ShotPtr>(filter_mode::serial_in_order, [&](const ShotPtr& shot) {
+          expose(*shot);
+          return shot;
+        });
+    const auto written = tbb::make_filter<ShotPtr, void>(
+        filter_mode::parallel, [&](const ShotPtr& shot) { finish(*shot); });
+    tbb::parallel_pipeline(in_flight, first & rendered & exposed & written);
   }
 
-  void make_frame(int frame) {
+  ShotPtr shoot(int frame) {
     const auto i = static_cast<std::size_t>(frame);
     const bool last = i + 1 == track_.size();
     CleanFrame clean = renderer_.render(track_[i].world_from_camera,
                                         last ? nullptr : &track_[i + 1].world_from_camera, &times, frame);
     const double start = thread_seconds();
-    const Exposure exposure = sensor_.expose(clean.radiance);
+    const Exposure metered = sensor_.expose(clean.radiance);
     sensor_s += thread_seconds() - start;
-    const cv::Mat bgr =
-        sensor_.digitise(clean.radiance, exposure, frame, clean.truth.masks, false, &sensor_s).bgr;
-    {
-      const std::lock_guard lock(mutex_);
-      if (log_) log_->add(frame, exposure);
-      (*exposures_)[frame] = exposure;
-    }
-    const ThreadUsage before = thread_usage();
-    writer_.write_frame(frame, bgr, clean.truth);
-    const ThreadUsage after = thread_usage();
-    encode_s += after.user_s - before.user_s;
-    write_s += after.system_s - before.system_s;
+    return std::make_shared<Shot>(Shot{frame, std::move(clean), {{}, metered}});
+  }
+
+  void expose(Shot& shot) {
+    const std::lock_guard lock(mutex_);
+    const auto known = exposures_->find(shot.frame);
+    shot.exposure.used = known != exposures_->end()
+                             ? known->second.used
+                             : control_.next(shot.frame, shot.exposure.metered, *exposures_);
+    (*exposures_)[shot.frame] = shot.exposure;
+  }
+
+  void finish(Shot& shot) {
+    if (shot.frame >= first_written_) write(shot);
     const std::lock_guard lock(mutex_);
     ++rendered_;
     changed_.notify_one();
   }
 
+  void write(Shot& shot) {
+    const cv::Mat& radiance = shot.clean.radiance;
+    FrameTruth& truth = shot.clean.truth;
+    const Exposure& exposure = shot.exposure.used;
+    const SensorImages images =
+        sensor_.digitise(radiance, exposure, shot.frame, truth.masks, output_.adc, &sensor_s);
+    ExtraImages extra{images.adc_bgr, images.mosaic, {}, {}};
+    if (output_.radiance) extra.radiance = sensor_.relative(radiance, exposure);
+    if (output_.paired) {
+      cv::Mat unused(radiance.size(), CV_8U, cv::Scalar(0));
+      extra.clean =
+          clean_sensor_.digitise(radiance, exposure, shot.frame, unused, false, &sensor_s).bgr;
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      if (log_) log_->add(shot.frame, shot.exposure);
+    }
+    const ThreadUsage before = thread_usage();
+    writer_.write_frame(shot.frame, images.bgr, truth, extra);
+    const ThreadUsage after = thread_usage();
+    encode_s += after.user_s - before.user_s;
+    write_s += after.system_s - before.system_s;
+  }
+
   const FrameRenderer& renderer_;
-  const SensorModel& sensor_;
+  const SensorModel &sensor_, &clean_sensor_;
+  const ExposureControl& control_;
+  const OutputSettings& output_;
   const DatasetWriter& writer_;
   const PoseTrack& track_;
+  int first_written_;
   ExposureLog* log_;
-  std::map<int, Exposure>* exposures_ = nullptr;
+  std::map<int, FrameExposure>* exposures_ = nullptr;
   std::atomic<bool> stop_ = false;
   std::mutex mutex_;  // of what follows, the log and the exposures
   std::condition_variable changed_;
@@ -198,13 +264,18 @@ SimulateResult simulate(const SimulateOptions& options, const std::filesystem::p
   progress.end(fmt::format("{:.1f} cm", cm_from_mm(path.length_mm)));
 
   const bool whole = options.only_frame < 0;
-  std::map<int, Exposure> exposures = ExposureLog::read(out);
+  std::map<int, FrameExposure> exposures = ExposureLog::read(out);
   DatasetWriter writer(out, info_of(options, frames));
   writer.write_scene(camera, path.track, scene.wall);
+  const ExposureControl control(camera.sensor, options.render.sensor);
+  const int first = std::max(0, options.only_frame), last = whole ? frames - 1 : first;
   std::vector<int> todo;
-  for (int i = 0; i < frames; ++i)
-    if (whole ? !(writer.has_frame(i) && exposures.contains(i)) : i == options.only_frame)
-      todo.push_back(i);
+  for (int i = first; i <= last; ++i)
+    if (!whole || !(writer.has_frame(i) && exposures.contains(i))) todo.push_back(i);
+  // a single frame whose exposure follows others
+  std::vector<int> metered;
+  if (control.has_memory() && !whole && !exposures.contains(first))
+    for (int i = 0; i < first; ++i) metered.push_back(i);
 
   SimulateResult result;
   result.frames = static_cast<int>(todo.size());
@@ -212,7 +283,7 @@ SimulateResult simulate(const SimulateOptions& options, const std::filesystem::p
   result.path_length_mm = path.length_mm;
   result.min_clearance_mm = path.min_clearance_mm;
 
-  progress.begin("frames", todo.size());
+  progress.begin("frames", metered.size() + todo.size());
   if (!todo.empty()) {
     const LightSettings& light = options.render.light;
     const FrameRenderer renderer(
@@ -222,8 +293,11 @@ SimulateResult simulate(const SimulateOptions& options, const std::filesystem::p
          .paths = {light.bounces, light.samples, light.roulette, options.seed}});
     const SensorModel sensor(camera.sensor,
                              {options.render.sensor, trajectory.read_noise_factor, options.seed});
+    const SensorModel clean_sensor(camera.sensor, faultless({options.render.sensor}));
     ExposureLog log(out, exposures);
-    FrameLoop loop(renderer, sensor, writer, path.track, &log);
+    todo.insert(todo.begin(), metered.begin(), metered.end());
+    FrameLoop loop(renderer, sensor, clean_sensor, control, options.render.output, writer,
+                   path.track, first, &log);
     const Clock::time_point loop_start = Clock::now();
     loop.run(todo, threads, progress, exposures);
     result.wall_s = seconds_since(loop_start);
@@ -240,8 +314,8 @@ SimulateResult simulate(const SimulateOptions& options, const std::filesystem::p
     progress.begin("manifest");
     std::vector<double> exposure_s, gain;
     for (int i = 0; i < frames; ++i) {
-      exposure_s.push_back(exposures.at(i).time_s);
-      gain.push_back(exposures.at(i).gain);
+      exposure_s.push_back(exposures.at(i).used.time_s);
+      gain.push_back(exposures.at(i).used.gain);
     }
     writer.finish(exposure_s, gain);
     progress.end();

@@ -40,7 +40,20 @@ TEST(Settings, MistakesOfTheSensorAreNamedToTheLetter) {
   EXPECT_EQ(change("sensor.bayer=rgbg"),
             "sensor.bayer=rgbg:1:18: bayer is 'rgbg', expected one of: none, rggb, bggr, grbg, "
             "gbrg; did you mean 'rggb'?");
+  EXPECT_EQ(change("output.jpeg_quality=0"),
+            "output.jpeg_quality=0:1:25: jpeg_quality is 0, expected 1 to 100");
+  EXPECT_EQ(change("sensor.delay_frames=-1"),
+            "sensor.delay_frames=-1:1:25: delay_frames is -1, expected 0 to 100");
+  EXPECT_EQ(change("sensor.smoothing=1"),
+            "sensor.smoothing=1:1:22: smoothing is 1, expected 0 to 0.99");
   EXPECT_EQ(change("sensor.prnu=-1"), "sensor.prnu=-1:1:17: prnu is '-1', expected true or false");
+  EXPECT_EQ(change("output.frames=jpg"),
+            "output.frames=jpg:1:19: frames is 'jpg', expected one of: png, jpeg; did you mean "
+            "'jpeg'?");
+  RenderSettings settings;
+  settings.output.mosaic = true;
+  EXPECT_EQ(message_of([&] { settings.check(); }),
+            "render.output: mosaic is true, but render.sensor.bayer is none");
 }
 
 TEST(Settings, MistakesOfTheLightAreNamedToTheLetter) {

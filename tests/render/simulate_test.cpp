@@ -6,15 +6,19 @@
 #include <csignal>
 #include <cstdlib>
 #include <map>
+#include <opencv2/core.hpp>
 #include <thread>
 
 #include "core/check.h"
 #include "core/files.h"
 #include "core/mesh_io.h"
 #include "dataset/check_dataset.h"
+#include "dataset/frame_list.h"
+#include "dataset/image_io.h"
 #include "dataset/layout.h"
 #include "dataset/observations.h"
 #include "dataset/truth.h"
+#include "render/isp.h"
 #include "tests/render/walls.h"
 
 namespace rugae {
@@ -157,6 +161,106 @@ TEST_F(Simulate, AProcessKilledInTheMiddleGoesOn) {
   EXPECT_GT(result.frames, 0);
   run("whole");
   expect_same("whole", "killed");
+}
+
+// Exposure that follows earlier frames: the same for any threads, after a kill, and alone.
+TEST_F(Simulate, AutomaticExposureHasTheSameBytesHoweverItIsRun) {
+  options_.render.sensor.exposure = ExposureMode::automatic;
+  options_.render.sensor.delay_frames = 1;
+  options_.frames = 12;
+  options_.threads = 1;
+  run("whole");
+  options_.threads = 2;
+  run("two");
+  expect_same("whole", "two");
+  const DatasetLayout whole{root_ / "whole"};
+  const auto list = read_frame_list(whole.frame_list());
+  options_.render.sensor.exposure = ExposureMode::per_frame;
+  run("memoryless");
+  const auto metered = read_frame_list(DatasetLayout{root_ / "memoryless"}.frame_list());
+  const auto total = [](const FrameRecord& record) { return record.exposure_s * record.gain; };
+  for (std::size_t i = 1; i < list.size(); ++i) {
+    const double expected = std::sqrt(total(list[i - 1]) * total(metered[i - 1]));
+    EXPECT_TRUE(std::abs(total(list[i]) / expected - 1.0) <= 1e-6) << i;
+    EXPECT_NE(total(list[i]), total(metered[i])) << i;
+  }
+
+  options_.render.sensor.exposure = ExposureMode::automatic;
+  options_.only_frame = 7;
+  EXPECT_EQ(run("alone").frames, 1);
+  const DatasetLayout alone{root_ / "alone"};
+  EXPECT_EQ(read_text(whole.frame(7)), read_text(alone.frame(7)));
+  EXPECT_FALSE(fs::exists(alone.frame(6)));
+}
+
+TEST_F(Simulate, AutomaticExposureGoesOnAfterAKill) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  options_.render.sensor.exposure = ExposureMode::automatic;
+  options_.frames = 60;
+  EXPECT_EXIT(
+      {
+        const fs::path started = DatasetLayout{root_ / "killed"}.frame(9);
+        std::jthread killer([started] {
+          while (!fs::exists(started)) std::this_thread::yield();
+          kill(getpid(), SIGKILL);
+        });
+        run("killed");
+        _exit(0);
+      },
+      testing::KilledBySignal(SIGKILL), "");
+  const DatasetLayout killed{root_ / "killed"};
+  // also frames behind which others are there
+  for (int i : {2, 5}) fs::remove(killed.frame(i));
+  const SimulateResult result = run("killed");
+  EXPECT_GT(result.skipped, 0);
+  EXPECT_GT(result.frames, 0);
+  run("whole");
+  expect_same("whole", "killed");
+}
+
+TEST_F(Simulate, EveryOutputReadsBack) {
+  options_.frames = 3;
+  options_.render.sensor.bayer = Bayer::gbrg;
+  options_.render.sensor.prnu = true;
+  options_.render.output = {.frames = FrameFormat::jpeg,
+                            .jpeg_quality = 70,
+                            .adc = true,
+                            .mosaic = true,
+                            .radiance = true,
+                            .paired = true};
+  run("a");
+  options_.render.output = {};
+  run("png");
+  options_.render.sensor = {.noise = false};
+  run("clean");
+  const DatasetLayout a{root_ / "a"}, png{root_ / "png"}, clean{root_ / "clean"};
+  EXPECT_EQ(check_dataset(root_ / "a").problems, std::vector<std::string>{});
+  const Observations seen = Observations::open(root_ / "a");
+  EXPECT_EQ(seen.file(1).filename(), "000001.jpg");
+  EXPECT_FALSE(fs::exists(a.png_frame(1)));
+  // JPEG at quality 70 keeps this noisy frame to a few values in 255
+  const cv::Mat frame = read_image_bgr(png.frame(1));
+  EXPECT_LT(cv::norm(seen.image(1), frame, cv::NORM_L1) / (3.0 * frame.total()), 8.0);
+  EXPECT_GT(cv::norm(seen.image(1), frame, cv::NORM_L1), 0.0);
+  // the frame is the displayed picture of the demosaiced numbers
+  const cv::Mat mosaic = read_image_as_stored(a.mosaic(1)), adc = read_image_as_stored(a.adc(1));
+  ASSERT_EQ(mosaic.type(), CV_16UC1);
+  ASSERT_EQ(adc.type(), CV_16UC3);
+  EXPECT_EQ(cv::norm(demosaic(mosaic, Bayer::gbrg), adc, cv::NORM_INF), 0.0);
+  const DisplayTable table(Tone::srgb, 0, 1023);
+  const cv::Mat radiance = read_any_exr(a.radiance(1));
+  ASSERT_EQ(radiance.type(), CV_32FC3);
+  const cv::Mat paired = read_image_bgr(a.clean(1));
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x)
+      for (int c = 0; c < 3; ++c) {
+        ASSERT_EQ(frame.at<cv::Vec3b>(y, x)[c], table(2 - c, adc.at<cv::Vec3w>(y, x)[c]));
+        const double light = radiance.at<cv::Vec3f>(y, x)[2 - c];
+        // 8 bits of the light itself, to a step of the converter and one of the display
+        ASSERT_NEAR(paired.at<cv::Vec3b>(y, x)[c], 255.0 * display_value(Tone::srgb, light), 4.0);
+      }
+  EXPECT_EQ(read_text(a.clean(1)), read_text(clean.frame(1)));
+  EXPECT_EQ(read_text(a.depth(1)), read_text(clean.depth(1)));
 }
 
 TEST_F(Simulate, OnlyFrameIsThatFrameOfTheWholeRun) {
