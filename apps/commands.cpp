@@ -49,7 +49,8 @@ void add_simulate(CLI::App& app) {
       "simulate", "Render a dataset: frames, times, calibration and exact truth");
   command.add_option("--scene", a->options.scene, "Preset, YAML or mesh file")
       ->capture_default_str();
-  command.add_option("--camera", a->options.camera, "Preset or YAML")->capture_default_str();
+  command.add_option("--camera", a->options.camera, "Preset or YAML of a camera or a rig")
+      ->capture_default_str();
   command.add_option("--trajectory", a->options.trajectory, "Preset 1 to 6 or YAML")
       ->capture_default_str();
   command.add_option("--resolution", a->options.resolution, "Wall detail: coarse, medium or fine")
@@ -270,13 +271,13 @@ void add_list(CLI::App& app) {
   };
   const auto a = std::make_shared<Arguments>();
   CLI::App& command = *app.add_subcommand("list", "Names of the presets");
-  command.add_option("kind", a->kind, "scenes, cameras, trajectories or studies")->required();
+  command.add_option("kind", a->kind, "scenes, cameras, rigs, trajectories or studies")->required();
   add_json_flag(command, a->json);
   command.callback([a] {
-    const std::vector<std::string> kinds = {"scenes", "cameras", "trajectories", "studies"};
+    const std::vector<std::string> kinds = {"scenes", "cameras", "rigs", "trajectories", "studies"};
     check(std::ranges::count(kinds, a->kind) > 0, "list '{}': no such kind{}; known: {}", a->kind,
           did_you_mean(a->kind, kinds), fmt::join(kinds, ", "));
-    const auto names = preset_names(a->kind);
+    const auto names = preset_names(a->kind == "rigs" ? "cameras/rigs" : a->kind);
     print(a->json, names, fmt::format("{}", fmt::join(names, "\n")));
   });
 }

@@ -26,6 +26,7 @@ enum class Purpose : std::uint32_t {
   test = 8,
   oil = 9,
   light_path = 12,
+  rig_camera = 13,
   scene_instances = 20,
   scene_draw = 21,
 };

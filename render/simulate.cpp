@@ -42,15 +42,19 @@ int default_frames(const TrajectoryOptions& trajectory, const Camera& camera) {
 }
 
 Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajectory,
-               const Camera& camera, const Scene& scene) {
+               const Mount& mount, const Scene& scene) {
+  const Camera& camera = mount.camera;
   const int frames = options.frames > 0 ? options.frames : default_frames(trajectory, camera);
   // a planned path keeps clear of wherever the wall may move; a given one is only checked
   TrajectoryOptions at_rest = trajectory;
+  at_rest.clearance_mm += mount.reach_mm;
   if (trajectory.file.empty()) at_rest.clearance_mm += scene.motion_reach_mm;
   const PlannedPath path = plan_path(scene.wall, at_rest, options.seed);
   PoseTrack track = sample_path(path, frames, camera.sensor.fps);
-  check_moving_clearance(scene, track, trajectory.clearance_mm,
+  check_moving_clearance(scene, track, trajectory.clearance_mm + mount.reach_mm,
                          fmt::format("trajectory '{}'", trajectory.name));
+  for (TimedPose& pose : track)
+    pose.world_from_camera = pose.world_from_camera * mount.capsule_from_camera;
   return {std::move(track), path.length_mm(), path.min_clearance_mm()};
 }
 
@@ -168,8 +172,9 @@ class FrameLoop {
   ShotPtr shoot(int frame) {
     const auto i = static_cast<std::size_t>(frame);
     const bool last = i + 1 == track_.size();
-    CleanFrame clean = renderer_.render(track_[i].world_from_camera,
-                                        last ? nullptr : &track_[i + 1].world_from_camera, &times, frame);
+    CleanFrame clean =
+        renderer_.render(track_[i].world_from_camera,
+                         last ? nullptr : &track_[i + 1].world_from_camera, &times, frame);
     const double start = thread_seconds();
     const Exposure metered = sensor_.expose(clean.radiance);
     sensor_s += thread_seconds() - start;
@@ -246,18 +251,26 @@ void SimulateOptions::check() const {
 SimulateResult simulate(const SimulateOptions& options, const std::filesystem::path& out,
                         Progress& progress) {
   options.check();
+  if (is_rig(options.camera)) return simulate_rig(options, load_rig(options.camera), out, progress);
+  return simulate_mounted(options, {load_camera(options.camera), {}, 0.0, options.seed}, out,
+                          progress);
+}
+
+SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mount,
+                                const std::filesystem::path& out, Progress& progress) {
+  options.check();
   const int threads =
       options.threads > 0 ? options.threads : tbb::this_task_arena::max_concurrency();
 
   progress.begin("scene");
-  const Camera camera = load_camera(options.camera);
+  const Camera& camera = mount.camera;
   const TrajectoryOptions trajectory = load_trajectory(options.trajectory);
   make_folder(out);  // a folder that cannot be is said before the long work, not after
   const Scene scene = load_scene({options.scene, options.seed, options.resolution, trajectory.oil});
   progress.end(fmt::format("{} triangles", scene.wall.triangles.size()));
 
   progress.begin("path");
-  const Path path = find_path(options, trajectory, camera, scene);
+  const Path path = find_path(options, trajectory, mount, scene);
   const int frames = static_cast<int>(path.track.size());
   check(options.only_frame < frames, "only-frame is {}, but there are {} frames",
         options.only_frame, frames);
@@ -290,9 +303,9 @@ SimulateResult simulate(const SimulateOptions& options, const std::filesystem::p
         scene, camera,
         {.vignetting = options.render.lens.vignetting,
          .labels = options.render.labels,
-         .paths = {light.bounces, light.samples, light.roulette, options.seed}});
-    const SensorModel sensor(camera.sensor,
-                             {options.render.sensor, trajectory.read_noise_factor, options.seed});
+         .paths = {light.bounces, light.samples, light.roulette, mount.noise_seed}});
+    const SensorModel sensor(
+        camera.sensor, {options.render.sensor, trajectory.read_noise_factor, mount.noise_seed});
     const SensorModel clean_sensor(camera.sensor, faultless({options.render.sensor}));
     ExposureLog log(out, exposures);
     todo.insert(todo.begin(), metered.begin(), metered.end());

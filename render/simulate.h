@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "cameras/rig.h"
 #include "core/progress.h"
 #include "render/settings.h"
 
@@ -12,7 +13,7 @@ namespace rugae {
 
 struct SimulateOptions {
   std::string scene = "stomach";        // preset, YAML or mesh file
-  std::string camera = "misumi-v5506";  // preset or YAML
+  std::string camera = "misumi-v5506";  // preset or YAML, of a camera or of a rig
   std::string trajectory = "1";         // preset or YAML
   std::string resolution = "medium";
   int frames = 0;       // 0: as many as in the paper for this camera and trajectory, or in the file
@@ -40,5 +41,19 @@ struct SimulateResult {
 /// Interrupted after Ctrl-C.
 SimulateResult simulate(const SimulateOptions& options, const std::filesystem::path& out,
                         Progress& progress);
+
+/// A camera where it stands on the capsule.
+struct Mount {
+  Camera camera;
+  Rigid3 capsule_from_camera;
+  double reach_mm = 0.0;         // of the capsule around the path: a planned path keeps that clear
+  std::uint64_t noise_seed = 1;  // of what the camera draws alone
+};
+/// The dataset of one camera; `options.camera` is its name in the dataset.
+SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mount,
+                                const std::filesystem::path& out, Progress& progress);
+/// One dataset a camera in `out`/<its name>, and `out`/rig.json. What `simulate` does for a rig.
+SimulateResult simulate_rig(const SimulateOptions& options, const Rig& rig,
+                            const std::filesystem::path& out, Progress& progress);
 
 }  // namespace rugae

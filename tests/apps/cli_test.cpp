@@ -81,7 +81,7 @@ TEST_F(CommandLine, UnknownCommandsAndOptionsOfferTheNearest) {
   expect_refused("simulate", "simulate: --out is required; see rugae simulate --help");
   expect_refused("list camera",
                  "list 'camera': no such kind; did you mean 'cameras'?; known: scenes, cameras, "
-                 "trajectories, studies");
+                 "rigs, trajectories, studies");
 }
 
 TEST_F(CommandLine, MisspeltCameraOffersTheNearest) {
