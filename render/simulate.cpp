@@ -53,8 +53,12 @@ Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajecto
   PoseTrack track = sample_path(path, frames, camera.sensor.fps);
   check_moving_clearance(scene, track, trajectory.clearance_mm + mount.reach_mm,
                          fmt::format("trajectory '{}'", trajectory.name));
-  for (TimedPose& pose : track)
-    pose.world_from_camera = pose.world_from_camera * mount.capsule_from_camera;
+  // A camera in the capsule's place keeps the path to the last bit.
+  const Rigid3& capsule_from_camera = mount.capsule_from_camera;
+  if (!capsule_from_camera.translation.isZero(0.0) ||
+      !capsule_from_camera.rotation.vec().isZero(0.0))
+    for (TimedPose& pose : track)
+      pose.world_from_camera = pose.world_from_camera * capsule_from_camera;
   return {std::move(track), path.length_mm(), path.min_clearance_mm()};
 }
 
