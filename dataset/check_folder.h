@@ -1,8 +1,6 @@
 #pragma once
 // `rugae check` for a folder that rugae did not make.
 
-#include <optional>
-
 #include "dataset/check_dataset.h"
 #include "dataset/plain_folder.h"
 
@@ -14,13 +12,5 @@ namespace rugae {
 /// a sample of frames, that depth, poses, flow and colour belong together (dataset/diagnose.h).
 /// Throws Error when there is no folder of images, or something that was named is not there.
 DatasetCheck check_folder(const std::filesystem::path& root, const PlainFolderOptions& options);
-
-/// What is wrong with a depth image by itself, or nothing: no value above 0, or one value
-/// everywhere.
-std::string depth_problem(const cv::Mat& depth_mm);
-
-/// The size in px at which the flow was cut off, if it was: far more pixels hold that very number
-/// than the tenth below it, while others are smaller.
-std::optional<double> clamped_at_px(const cv::Mat& flow_px);
 
 }  // namespace rugae

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <opencv2/core.hpp>
 #include <optional>
 
 #include "core/check.h"
 #include "dataset/image_io.h"
+#include "dataset/label_values.h"
+#include "dataset/pose_mistakes.h"
 
 namespace rugae {
 namespace fs = std::filesystem;
@@ -129,10 +132,14 @@ std::string explanation(const LabelSources& in, int index, const std::vector<Sam
     errors.resize((errors.size() * 9 + 9) / 10);  // in another frame some labels are not known
     return agree(errors);
   };
+  if (const auto limit = clamped_at_px(flow))
+    return fmt::format("; the flow is clamped at {:g} px", *limit);
   if (fits(depth, flow, next_from_now, -1.0)) return "; the flow's sign is flipped";
   if (fits(depth, flow, next_from_now, 1.0, DepthKind::range))
     return "; the depth is the distance along the ray, not along z";
-  if (fits(depth, flow, next * now.inverse())) return "; the poses are camera_from_world";
+  for (const PoseMistake& mistake : pose_mistakes())
+    if (fits(depth, flow, mistake.undo(next).inverse() * mistake.undo(now)))
+      return "; the poses are wrong: " + mistake.text;
   for (const int other : {index - 1, index + 1}) {
     if (other < 0) continue;
     if (const auto d = read_quietly(in.layout.depth(other), depth))
@@ -147,6 +154,12 @@ std::string explanation(const LabelSources& in, int index, const std::vector<Sam
              in.track[o + 1].world_from_camera.inverse() * in.track[o].world_from_camera))
       return fmt::format("; the poses of frame {} fit: poses are shifted by one frame", other);
   }
+  constexpr double kSame_rad = 1e-6;
+  const Quat& first = in.track[0].world_from_camera.rotation;
+  if (std::ranges::all_of(in.track, [&first](const TimedPose& pose) {
+        return angle_between_rad(pose.world_from_camera.rotation, first) <= kSame_rad;
+      }))
+    return "; the rotation never changes";
   return {};
 }
 
@@ -199,6 +212,12 @@ LabelCheck check_labels(const LabelSources& in, int index) {
                         read_label(flow, read_exr, CV_32FC2, in.lens, result);
   if (has_normals) check_facing(in.lens, normals, result);
   if (!has_masks) return result;
+  if (has_depth && cv::countNonZero(masks.image & kMaskValid) > 0 &&
+      !(cv::countNonZero(depth.image > 0.0) > 0)) {
+    result.problems.push_back(
+        {"no depth", fmt::format("{}: {}", depth.file.string(), depth_problem(depth.image))});
+    return result;
+  }
   if (has_depth)
     check_presence(
         depth, masks, kMaskValid, "depth",

@@ -121,7 +121,12 @@ class Diagnoser {
       const std::vector<FramePair> pairs = spread_pairs(sequence_.size(), gap);
       if (pairs.empty()) break;
       const Contest contest = depth_contest(pairs, readings);
-      if (gap == 1) result_.depth_share = contest.medians[0];
+      // frames too far apart to see the same wall tell nothing
+      constexpr double kOverlap = 0.4;
+      if (gap == 1 &&
+          static_cast<double>(contest.counts[0]) >=
+              std::max(kFewSamples, kOverlap * static_cast<double>(pairs.size() * grid_.patches())))
+        result_.depth_share = contest.medians[0];
       const std::size_t winner = contest.winner(kSoundShare, kExplainedShare);
       if (winner == 0 || contest.margin(winner) <= margin) continue;
       won = winner;
@@ -297,7 +302,7 @@ class Diagnoser {
         factor = factors[static_cast<std::size_t>(best - contest.medians.begin())];
         return std::pair(contest, static_cast<std::size_t>(best - contest.medians.begin()));
       };
-      contest_around(100.0, 32);
+      contest_around(1e4, 64);
       for (const double width : {1.15, 1.03, 1.004}) contest_around(width, 8);
       const auto [contest, best] = contest_around(1.0005, 4);
       if (contest.winner(kSoundShare, kExplainedShare) == 0) continue;

@@ -30,6 +30,7 @@ enum class DepthKind { z, range };
 class WarpGrid {
  public:
   explicit WarpGrid(const Lens& lens);
+  std::size_t patches() const { return patches_.size(); }
 
   /// Share of the patches' centres that have depth and land inside the other frame, 0 to 1, and how
   /// far they move, px, in the median; 0 and 0 where none does.

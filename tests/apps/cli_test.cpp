@@ -156,6 +156,31 @@ TEST_F(CommandLine, DamagedDatasetsAreNamed) {
       << problems;
 }
 
+TEST_F(CommandLine, CheckReadsAFolderThatOthersMade) {
+  write("tiny.yaml", kTinyCamera);
+  write("short.yaml", "like: '1'\nlength_cm: 8\npasses: 1\n");
+  const Outcome made = rugae(
+      "simulate --resolution coarse --camera tiny.yaml --trajectory short.yaml --frames 8 --out "
+      "data");
+  ASSERT_EQ(made.code, kDone) << made.error;
+  fs::create_directories(folder_ / "theirs");
+  fs::rename(folder_ / "data/observations/frames", folder_ / "theirs/rgb");
+  fs::rename(folder_ / "data/truth/depth", folder_ / "theirs/depth");
+  fs::rename(folder_ / "data/truth/trajectory.txt", folder_ / "theirs/path.txt");
+  fs::rename(folder_ / "data/observations/calibration.yaml", folder_ / "theirs/lens.yaml");
+  const Outcome sound = rugae("check theirs --poses theirs/path.txt");
+  EXPECT_EQ(sound.code, kDone) << sound.out;
+  EXPECT_EQ(sound.out, "theirs: 8 frames, 18 files, sound\n");
+  const Outcome scaled = rugae("check theirs --poses theirs/path.txt --depth-scale 0.001");
+  EXPECT_EQ(scaled.code, kBadInput);
+  EXPECT_EQ(scaled.out.substr(0, scaled.out.find(": depth led")),
+            "theirs/path.txt: the poses are wrong: they are in millimetres where the depth is in "
+            "metres (a factor 1000)");
+  expect_refused("check theirs --poses nowhere.txt", "nowhere.txt: no such file or folder");
+  expect_refused("check theirs --images theirs/lens.yaml",
+                 "theirs/lens.yaml: is a file, expected a folder");
+}
+
 TEST_F(CommandLine, SimulateGoesOnAndSaysSoInJson) {
   small_dataset();
   const Outcome again = rugae(

@@ -233,7 +233,56 @@ TEST_F(CheckDataset, InvertedPosesAreNamed) {
   write_atomic(layout_.trajectory(), tum_text(track));
   seal(layout_.root);
   expect_flow_problem(problems(), layout_,
-                      "; the poses are camera_from_world (and in 3 further frames)");
+                      "; the poses are wrong: they are camera_from_world, expected "
+                      "world_from_camera (and in 3 further frames)");
+}
+
+TEST_F(CheckDataset, OtherMistakesOfThePosesAreNamed) {
+  const auto said = [&](const std::function<Rigid3(const Rigid3&)>& change) {
+    PoseTrack track = world_.track;
+    for (TimedPose& pose : track) pose.world_from_camera = change(pose.world_from_camera);
+    write_atomic(layout_.trajectory(), tum_text(track));
+    seal(layout_.root);
+    const Problems found = problems();
+    EXPECT_EQ(found.size(), 1u);
+    const std::string text = found.empty() ? "" : found[0];
+    return text.substr(std::min(text.size(), text.find("px; ") + 4));
+  };
+  EXPECT_EQ(said([](const Rigid3& p) { return Rigid3(p.rotation.conjugate(), p.translation); }),
+            "the poses are wrong: their rotations are transposed (and in 3 further frames)");
+  EXPECT_EQ(said([](const Rigid3& p) { return Rigid3(p.rotation, 0.001 * p.translation); }),
+            "the poses are wrong: they are in metres where the depth is in millimetres (a factor "
+            "1000) (and in 3 further frames)");
+  EXPECT_EQ(said([](const Rigid3& p) {
+              const Mat3 m = Vec3(1, -1, 1).asDiagonal();
+              return Rigid3(Mat3(m * p.rotation.toRotationMatrix() * m), Vec3(m * p.translation));
+            }),
+            "the poses are wrong: their y axis is flipped: the axes are left-handed (and in 3 "
+            "further frames)");
+  EXPECT_EQ(said([](const Rigid3& p) { return Rigid3(Quat::Identity(), p.translation); }),
+            "the rotation never changes (and in 3 further frames)");
+}
+
+TEST_F(CheckDataset, DepthThatIsZeroEverywhereIsNamed) {
+  rewrite_depths([&](int i) {
+    const cv::Mat depth = world_.truth(i).depth_mm;
+    return cv::Mat(depth * 0.0);
+  });
+  EXPECT_EQ(problems(), Problems{text(layout_.depth(0)) +
+                                 ": no depth above 0 anywhere (and in 4 further frames)"});
+}
+
+TEST_F(CheckDataset, ClampedFlowIsNamed) {
+  rewrite_flows([&](int i) {
+    cv::Mat flow = world_.truth(i).flow_px;
+    for (cv::Vec2f& f : cv::Mat_<cv::Vec2f>(flow))
+      for (int c = 0; c < 2; ++c)
+        if (!std::isnan(f[c])) f[c] = std::clamp(f[c], -0.5f, 0.5f);
+    return flow;
+  });
+  const Problems found = problems();
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NE(found[0].find("; the flow is clamped at 0.5 px"), std::string::npos) << found[0];
 }
 
 TEST_F(CheckDataset, ASmallErrorOfTheFlowIsFound) {
