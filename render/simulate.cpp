@@ -16,6 +16,7 @@
 #include "render/clearance.h"
 #include "render/exposure_log.h"
 #include "render/frame.h"
+#include "render/scene_truth.h"
 #include "render/sensor.h"
 #include "render/thread_clock.h"
 #include "trajectories/trajectory.h"
@@ -62,7 +63,7 @@ Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajecto
   return {std::move(track), path.length_mm(), path.min_clearance_mm()};
 }
 
-DatasetInfo info_of(const SimulateOptions& options, int frames) {
+DatasetInfo info_of(const SimulateOptions& options, const Scene& scene, int frames) {
   DatasetInfo info;
   info.scene = options.scene;
   info.camera = options.camera;
@@ -78,7 +79,7 @@ DatasetInfo info_of(const SimulateOptions& options, int frames) {
                  output.mosaic,
                  output.radiance,
                  output.paired};
-  info.text = settings_json(options.render);
+  info.text = with_scene(settings_json(options.render), scene);
   return info;
 }
 
@@ -282,8 +283,9 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
 
   const bool whole = options.only_frame < 0;
   std::map<int, FrameExposure> exposures = ExposureLog::read(out);
-  DatasetWriter writer(out, info_of(options, frames));
+  DatasetWriter writer(out, info_of(options, scene, frames));
   writer.write_scene(camera, path.track, scene.wall);
+  write_scene_truth(scene, writer.layout().truth());
   const ExposureControl control(camera.sensor, options.render.sensor);
   const int first = std::max(0, options.only_frame), last = whole ? frames - 1 : first;
   std::vector<int> todo;

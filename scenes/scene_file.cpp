@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "core/check.h"
 #include "core/random.h"
@@ -148,6 +149,8 @@ struct Writer {
   }
 };
 
+std::string quoted(const std::string& text) { return nlohmann::json(text).dump(); }
+
 constexpr const char* kWallNormals[] = {"auto", "outward", "inward"};
 constexpr const char* kOpenEnds[] = {"cap", "refuse"};
 
@@ -217,7 +220,7 @@ std::string resolved_yaml(const SceneFile& scene) {
     writer.text = fmt::format(
         "kind: mesh\nmesh: {}\nmm_per_unit: {}\nwall_normals: {}\nopen_ends: {}\ncomponent: {}\n"
         "target_edge_mm: {}\nwith_relief: {}\n",
-        scene.mesh.generic_string(), o.mm_per_unit, kWallNormals[static_cast<int>(o.wall)],
+        quoted(scene.mesh.generic_string()), o.mm_per_unit, kWallNormals[static_cast<int>(o.wall)],
         kOpenEnds[static_cast<int>(o.open_ends)], o.component, o.target_edge_mm, o.with_relief);
   } else {
     writer.text = "kind: procedural\n";

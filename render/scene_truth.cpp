@@ -1,0 +1,29 @@
+#include "render/scene_truth.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "core/files.h"
+#include "scenes/instances.h"
+
+namespace rugae {
+
+std::string with_scene(const std::string& settings, const Scene& scene) {
+  auto json = nlohmann::ordered_json::parse(settings, nullptr, false);
+  check(json.is_object(), "the settings are not a JSON object: {}", settings);
+  if (!scene.resolved_yaml.empty()) json["scene_yaml"] = scene.resolved_yaml;
+  return json.dump();
+}
+
+void write_scene_truth(const Scene& scene, const std::filesystem::path& truth_folder) {
+  if (!scene.resolved_yaml.empty())
+    write_atomic(truth_folder / "scene.yaml",
+                 "# Every default and every draw filled in; with seed " +
+                     std::to_string(scene.seed) + " it gives the same scene.\n" +
+                     scene.resolved_yaml);
+  write_atomic(
+      truth_folder / "instances.csv",
+      instances_csv(scene.instances ? scene.instances->list() : std::vector<WallInstance>{}));
+}
+
+}  // namespace rugae
