@@ -237,14 +237,14 @@ void add_check(CLI::App& app, int& exit_code) {
 
 void add_picture(CLI::App& app) {
   struct Arguments {
-    std::vector<fs::path> datasets;
+    std::vector<fs::path> sources;
     fs::path out;
     int frame = 0, columns = 3, width = 400;
     bool labels = false;
   };
   const auto a = std::make_shared<Arguments>();
   CLI::App& command = *app.add_subcommand("picture", "Frames and their labels on one sheet");
-  command.add_option("datasets", a->datasets, "One or more datasets")->required();
+  command.add_option("sources", a->sources, "Datasets, or image files by their names")->required();
   command.add_option("--frame", a->frame, "Which frame")->capture_default_str();
   command.add_option("--columns", a->columns, "Pictures side by side")->capture_default_str();
   command.add_option("--width", a->width, "Of a picture, px")->capture_default_str();
@@ -252,7 +252,11 @@ void add_picture(CLI::App& app) {
   command.add_option("--out", a->out, "The sheet, a PNG")->required();
   command.callback([a] {
     std::vector<SheetTile> tiles;
-    for (const fs::path& dataset : a->datasets) {
+    for (const fs::path& dataset : a->sources) {
+      if (fs::is_regular_file(dataset)) {
+        tiles.push_back({dataset.stem().string(), read_image_bgr(dataset)});
+        continue;
+      }
       const fs::path folder = (dataset / "").parent_path();  // without a slash at the end
       const std::string name = fmt::format("{}, frame {}", folder.filename().string(), a->frame);
       tiles.push_back({name, read_image_bgr(DatasetLayout{dataset}.frame(a->frame))});
