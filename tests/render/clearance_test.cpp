@@ -18,9 +18,11 @@ Scene sphere(const std::function<Vec3(double, const Vec3&)>& move, double reach_
               .wall = test::sphere_mesh(4, kRadiusMm),
               .rest_positions = {},
               .regions = {},
+              .instances = {},
               .mucosa = Mucosa({}, 1),
               .motion = {},
-              .notes = {}};
+              .notes = {},
+              .resolved_yaml = {}};
   scene.rest_positions = scene.wall.vertices;
   scene.motion_reach_mm = reach_mm;
   scene.motion = [move, rest = scene.rest_positions](double time_s, std::vector<Vec3>& moved) {

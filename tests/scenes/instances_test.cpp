@@ -109,7 +109,9 @@ TEST(Instances, RaisingTheWallMovesNoOutline) {
     const Vec3 p = w.centre_mm + 8.0 * Vec3(u[0] - 0.5, u[1] - 0.5, u[2] - 0.5);
     const auto before = instances.at(p), after = instances.at(p + 2.5 * w.inward);
     ASSERT_EQ(before.instance != nullptr, after.instance != nullptr);
-    if (before.instance) EXPECT_NEAR(before.rho, after.rho, kRounding);
+    if (before.instance) {
+      EXPECT_NEAR(before.rho, after.rho, kRounding);
+    }
   }
   // not on the other side of the lumen
   EXPECT_EQ(instances.at(w.centre_mm + 30.0 * w.inward).instance, nullptr);
@@ -146,7 +148,9 @@ TEST(Instances, EveryKindIsThereAndNoneTouchesAnother) {
     ASSERT_LE(holders, 1);
   }
   for (std::size_t i = 0; i < list.size(); ++i)
-    if (list[i].radius_mm > 1.5) EXPECT_GE(vertices[i], 4) << list[i].id;
+    if (list[i].radius_mm > 1.5) {
+      EXPECT_GE(vertices[i], 4) << list[i].id;
+    }
 }
 
 TEST(Instances, APolypRaisesTheWallByItsHeight) {
