@@ -122,7 +122,26 @@ Sensor read_sensor(YamlReader yaml, int height) {
   return sensor;
 }
 
+Focus read_focus(YamlReader yaml) {
+  Focus focus;
+  yaml.require("f_number", focus.f_number);
+  yaml.require("distance_mm", focus.distance_mm);
+  check(focus.f_number >= 0.5 && focus.f_number <= 100.0, "{}: f_number is {}, expected 0.5 to 100",
+        yaml.where("f_number"), focus.f_number);
+  check(focus.distance_mm > 0.0 && focus.distance_mm <= 1e6,
+        "{}: distance_mm is {}, expected above 0 and at most 1000000", yaml.where("distance_mm"),
+        focus.distance_mm);
+  yaml.finish();
+  return focus;
+}
+
 }  // namespace
+
+double aperture_radius_mm(const Camera& camera) {
+  if (!(camera.focus.f_number > 0.0)) return 0.0;
+  const double focal_mm = 1e-3 * camera.lens.fx * camera.sensor.pixel_pitch_um;
+  return 0.5 * focal_mm / camera.focus.f_number;
+}
 
 Camera load_camera(const std::string& name_or_path) {
   const auto file = find_preset("cameras", "camera", name_or_path);
@@ -140,6 +159,7 @@ Camera load_camera(const std::string& name_or_path) {
   const auto lens = yaml.child("lens");
   check(lens.has_value(), "{}: key 'lens' is missing", lens_place);
   camera.lens = read_lens(*lens, lens_place);
+  if (auto focus = yaml.child("focus")) camera.focus = read_focus(std::move(*focus));
   if (auto vignetting = yaml.child("vignetting")) {
     vignetting->get("cos4", camera.vignetting.cos4);
     vignetting->get("v1", camera.vignetting.v1);
@@ -218,6 +238,9 @@ std::string camera_yaml(const Camera& camera) {
   if (s.shutter == Shutter::rolling) text += fmt::format("  row_time_us: {:.17g}\n", s.row_time_us);
   text += fmt::format("  prnu: {:.17g}\n  dsnu_e: {:.17g}\n  black_level: {}\n", s.prnu, s.dsnu_e,
                       s.black_level);
+  if (camera.focus.f_number > 0.0)
+    text += fmt::format("focus:\n  f_number: {:.17g}\n  distance_mm: {:.17g}\n",
+                        camera.focus.f_number, camera.focus.distance_mm);
   text += lights_yaml(camera.lights);
   return text;
 }

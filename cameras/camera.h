@@ -90,15 +90,25 @@ struct Sensor {
   int black_level = 0;       // the converter's number of no light
 };
 
+/// A thin lens of fixed focus.
+struct Focus {
+  double f_number = 0.0;     // focal length over the aperture's diameter; 0: not known
+  double distance_mm = 0.0;  // along the axis, of what is sharp
+};
+
 struct Camera {
   std::string name;
   Lens lens;
+  Focus focus;
   Vignetting vignetting;
   Sensor sensor;
   std::vector<Emitter> lights = {Emitter{}};
   int frames_in_paper = 0;   // of all six trajectories together
   double diameter_mm = 0.0;  // of the housing, bounds the clearance
 };
+
+/// Radius of the aperture, mm: fx times the pixel pitch is the focal length. 0 without an f-number.
+double aperture_radius_mm(const Camera& camera);
 
 /// A preset name or a YAML file.
 Camera load_camera(const std::string& name_or_path);

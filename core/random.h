@@ -29,6 +29,8 @@ enum class Purpose : std::uint32_t {
   rig_camera = 13,
   scene_instances = 20,
   scene_draw = 21,
+  lens_samples = 16,
+  track_points = 17,
 };
 
 /// Four independent 32-bit words for (seed, purpose, frame, index); index is the pixel or whatever

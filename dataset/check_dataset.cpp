@@ -30,19 +30,20 @@ class Checker {
     check_files();
     const auto camera = problems_.attempt([&] { return load_camera(layout_.camera().string()); });
     problems_.attempt([&] { return load_lens(layout_.calibration()); });
-    problems_.attempt([&] {
-      const TriangleMesh wall = read_ply(layout_.wall());
-      check_mesh(wall, layout_.wall().string());
-      return wall.vertices.size();
+    const auto wall = problems_.attempt([&] {
+      TriangleMesh mesh = read_ply(layout_.wall());
+      check_mesh(mesh, layout_.wall().string());
+      return mesh;
     });
     const auto track = problems_.attempt([&] { return read_tum(layout_.trajectory()); });
     if (track) check_track(*track, info.frames);
     if (track) check_times(*track, info.frames);
     if (camera) check_frames(camera->lens, info.frames);
-    if (camera && track && info.labels && static_cast<int>(track->size()) == info.frames)
-      check_all_labels({layout_, camera->lens, *track}, info.frames);
-    if (camera && track && info.labels && static_cast<int>(track->size()) == info.frames &&
-        problems_.none())
+    const bool labelled = camera && track && wall && info.labels &&
+                          static_cast<int>(track->size()) == info.frames;
+    if (labelled) check_all_labels({layout_, camera->lens, *track, &*camera, &*wall}, info);
+    // Colour is led from frame to frame by one pose a frame and a wall that keeps still.
+    if (labelled && problems_.none() && !info.truth.row_poses && !info.truth.wall_motion)
       check_colour(camera->lens, *track);
     result_.problems = problems_.take();
     return std::move(result_);
@@ -103,15 +104,14 @@ class Checker {
     }
   }
 
-  void check_all_labels(const LabelSources& sources, int frames) {
+  void check_all_labels(const LabelSources& sources, const DatasetInfo& info) {
+    const int frames = info.frames;
     std::vector<LabelCheck> checks(static_cast<std::size_t>(frames));
     tbb::parallel_for(
         0, frames, [&](int i) { checks[static_cast<std::size_t>(i)] = check_labels(sources, i); });
     std::vector<std::pair<LabelProblem, int>> kinds;  // the first of each kind, and how many follow
     for (int i = 0; i < frames; ++i) {
-      for (const auto& file : {layout_.depth(i), layout_.normals(i), layout_.masks(i)})
-        note_missing(file);
-      if (i + 1 < frames) note_missing(layout_.flow(i));
+      for (const auto& file : files_of_frame(layout_, info, i)) note_missing(file);
       const LabelCheck& found = checks[static_cast<std::size_t>(i)];
       result_.worst_flow_px = std::max(result_.worst_flow_px, found.worst_flow_px);
       result_.flow_samples += found.flow_samples;

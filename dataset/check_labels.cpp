@@ -104,6 +104,75 @@ std::vector<double> disagreement_px(const std::vector<Sample>& samples, const Le
   return errors;
 }
 
+// The wall between two frames: every vertex moves on a straight line at constant speed, and stands
+// still before the first and after the last frame.
+class MovingWall {
+ public:
+  MovingWall(const LabelSources& in, int index) {
+    const int last = static_cast<int>(in.track.size()) - 1;
+    for (int k = -1; k <= 1; ++k)
+      walls_.push_back(moved_wall(*in.wall, in.layout.wall_motion(std::clamp(index + k, 0, last))));
+  }
+  // Not a number where the label names no triangle.
+  Vec3 point(const cv::Vec3f& on_triangle, double beat) const {
+    if (!(on_triangle[0] >= 0.0f &&
+          on_triangle[0] < static_cast<float>(walls_[1].triangles.size())))
+      return Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+    const Vec3i& t = walls_[1].triangles[static_cast<std::size_t>(on_triangle[0])];
+    const double b1 = on_triangle[1], b2 = on_triangle[2], share = std::abs(beat);
+    const auto corner = [&](int k) -> Vec3 {
+      const auto v = static_cast<std::size_t>(t[k]);
+      return (1.0 - share) * walls_[1].vertices[v] + share * walls_[beat < 0.0 ? 0 : 2].vertices[v];
+    };
+    return (1.0 - b1 - b2) * corner(0) + b1 * corner(1) + b2 * corner(2);
+  }
+
+ private:
+  std::vector<TriangleMesh> walls_;
+};
+
+// The same where rows are exposed one after the other or the wall moves: the wall point is followed
+// to the time at which the row it lands in is exposed. Empty where the wall moves and the files do
+// not say on which triangle a pixel lies.
+std::vector<double> disagreement_over_time_px(const LabelSources& in, int index,
+                                              const std::vector<Sample>& samples,
+                                              const cv::Mat& depth, const cv::Mat& flow) {
+  const bool moves = fs::exists(in.layout.wall_motion(index));
+  if (moves && !fs::exists(in.layout.triangles(index))) return {};
+  const auto rows_of = [&](int frame) {
+    const fs::path file = in.layout.row_poses(frame);
+    return fs::exists(file) ? read_row_poses(file, *in.camera)
+                            : RowPoses(in.track[static_cast<std::size_t>(frame)].world_from_camera);
+  };
+  const RowPoses now = rows_of(index), next = rows_of(index + 1);
+  std::optional<MovingWall> wall_now, wall_next;
+  cv::Mat triangles;
+  if (moves) {
+    wall_now.emplace(in, index);
+    wall_next.emplace(in, index + 1);
+    triangles = read_exr(in.layout.triangles(index));
+  }
+  const double fps = in.camera->sensor.fps;
+  const LensProjector projector(in.lens);
+  std::vector<double> errors;
+  for (const Sample& sample : samples) {
+    const double depth_mm = depth.at<float>(sample.y, sample.x);
+    const Vec3 point = now.of_row(sample.y) * (sample.ray * (depth_mm / sample.ray.z()));
+    const auto at = [&](double offset_s) -> Vec3 {
+      if (!moves) return point;
+      const auto& on = triangles.at<cv::Vec3f>(sample.y, sample.x);
+      return point + (wall_next->point(on, fps * offset_s) -
+                      wall_now->point(on, fps * now.offset_s(sample.pixel.y())));
+    };
+    const auto seen = next.landing(projector, at, sample.pixel.y());
+    const cv::Vec2f f = flow.at<cv::Vec2f>(sample.y, sample.x);
+    const double error = seen ? (*seen - sample.pixel - Vec2(f[0], f[1])).norm() : NAN;
+    errors.push_back(std::isfinite(error) ? error : std::numeric_limits<double>::infinity());
+  }
+  std::ranges::sort(errors);
+  return errors;
+}
+
 double median(const std::vector<double>& sorted) { return sorted[sorted.size() / 2]; }
 
 bool agree(const std::vector<double>& sorted) {
@@ -170,16 +239,26 @@ void check_flow(const LabelSources& in, int index, const Label& depth, const Lab
   const auto at = static_cast<std::size_t>(index);
   const Rigid3 next_from_this =
       in.track[at + 1].world_from_camera.inverse() * in.track[at].world_from_camera;
-  const auto errors = disagreement_px(samples, in.lens, depth.image, flow.image, next_from_this);
+  const bool over_time =
+      fs::exists(in.layout.row_poses(index)) || fs::exists(in.layout.wall_motion(index));
+  std::vector<double> errors;
+  try {
+    errors = over_time ? disagreement_over_time_px(in, index, samples, depth.image, flow.image)
+                       : disagreement_px(samples, in.lens, depth.image, flow.image, next_from_this);
+  } catch (const Error& error) {
+    result.problems.push_back({"unreadable", error.what()});
+  }
+  if (errors.empty()) return;
   result.worst_flow_px = errors.back();
   result.flow_samples = errors.size();
   if (agree(errors)) return;
   result.problems.push_back(
-      {"flow", fmt::format("{}: disagrees with depth and pose: median {:.3g} px, worst {:.3g} px "
-                           "over {} sampled pixels, expected at most {} and {} px{}",
-                           flow.file.string(), median(errors), errors.back(), errors.size(),
-                           kMedianAgreement_px, kFlowAgreement_px,
-                           explanation(in, index, samples, depth.image, flow.image))});
+      {"flow",
+       fmt::format("{}: disagrees with depth and pose: median {:.3g} px, worst {:.3g} px "
+                   "over {} sampled pixels, expected at most {} and {} px{}",
+                   flow.file.string(), median(errors), errors.back(), errors.size(),
+                   kMedianAgreement_px, kFlowAgreement_px,
+                   over_time ? "" : explanation(in, index, samples, depth.image, flow.image))});
 }
 
 void check_facing(const Lens& lens, const Label& normals, LabelCheck& result) {

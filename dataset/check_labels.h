@@ -25,6 +25,8 @@ struct LabelSources {
   const DatasetLayout& layout;
   const Lens& lens;
   const PoseTrack& track;
+  const Camera* camera = nullptr;      // with a rolling shutter: its
+  const TriangleMesh* wall = nullptr;  // where it moves: at rest
 };
 
 /// Reads the labels of the frame and compares them; a label that is missing or cannot be read is a

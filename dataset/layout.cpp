@@ -45,5 +45,20 @@ std::filesystem::path DatasetLayout::flow(int index) const {
 std::filesystem::path DatasetLayout::masks(int index) const {
   return truth() / "masks" / numbered(index, ".png");
 }
+std::filesystem::path DatasetLayout::backward_flow(int index) const {
+  return truth() / "backward_flow" / numbered(index, ".exr");
+}
+std::filesystem::path DatasetLayout::triangles(int index) const {
+  return truth() / "triangles" / numbered(index, ".exr");
+}
+std::filesystem::path DatasetLayout::row_poses(int index) const {
+  return truth() / "row_poses" / numbered(index, ".txt");
+}
+std::filesystem::path DatasetLayout::tracks(int index) const {
+  return truth() / "tracks" / numbered(index, ".csv");
+}
+std::filesystem::path DatasetLayout::wall_motion(int index) const {
+  return truth() / "wall_motion" / numbered(index, ".ply");
+}
 
 }  // namespace rugae

@@ -23,6 +23,16 @@
 //       masks/000000.png        bits: see FrameMask
 //       radiance/000000.exr     on request: channels R G B, linear, 1 = full scale
 //       clean/000000.png        on request: the frame from a sensor without faults
+//                               and where asked for, or where there is something to say:
+//       backward_flow/000001.exr  as flow, from frame t to t-1 (absent for the first frame)
+//       triangles/000000.exr    channels x y z: triangle of the wall, barycentric coordinates of
+//       its
+//                               second and third corner
+//       row_poses/000000.txt    rolling shutter: TUM, poses of rows -1 to height
+//       wall_motion/000000.ply  moving wall: what to add to the vertices of wall.ply
+//       track_points.csv        point,triangle,b1,b2
+//       tracks/000000.csv       point,x,y,depth_mm,visible
+//       coverage.csv            triangle,frames
 
 #include <filesystem>
 #include <string>
@@ -65,6 +75,14 @@ struct DatasetLayout {
   std::filesystem::path masks(int index) const;
   std::filesystem::path radiance(int index) const;
   std::filesystem::path clean(int index) const;
+  // Where the dataset has them:
+  std::filesystem::path backward_flow(int index) const;
+  std::filesystem::path triangles(int index) const;
+  std::filesystem::path row_poses(int index) const;
+  std::filesystem::path wall_motion(int index) const;
+  std::filesystem::path track_points() const { return truth() / "track_points.csv"; }
+  std::filesystem::path tracks(int index) const;
+  std::filesystem::path coverage() const { return truth() / "coverage.csv"; }
 };
 
 }  // namespace rugae

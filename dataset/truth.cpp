@@ -16,6 +16,29 @@ cv::Mat of_size(cv::Mat image, int type, const Lens& lens, const std::filesystem
 
 }  // namespace
 
+RowPoses read_row_poses(const std::filesystem::path& file, const Camera& camera) {
+  const PoseTrack track = read_tum(file);
+  check(static_cast<int>(track.size()) == camera.lens.height + 2 &&
+            camera.sensor.shutter == Shutter::rolling,
+        "{}: {} poses, expected one a row and one beyond either border ({}) of a rolling shutter",
+        file.string(), track.size(), camera.lens.height + 2);
+  std::vector<Rigid3> poses;
+  for (const TimedPose& pose : track) poses.push_back(pose.world_from_camera);
+  return {std::move(poses), 1e-6 * camera.sensor.row_time_us};
+}
+
+TriangleMesh moved_wall(const TriangleMesh& rest, const std::filesystem::path& file) {
+  const std::vector<Vec3> displacement_mm = read_ply(file).vertices;
+  check(displacement_mm.size() == rest.vertices.size(),
+        "{}: {} vertices, expected the {} of the wall", file.string(), displacement_mm.size(),
+        rest.vertices.size());
+  TriangleMesh moved;
+  moved.vertices = rest.vertices;
+  moved.triangles = rest.triangles;
+  for (std::size_t v = 0; v < moved.vertices.size(); ++v) moved.vertices[v] += displacement_mm[v];
+  return moved;
+}
+
 Truth Truth::open(const std::filesystem::path& dataset) {
   Truth truth;
   truth.layout_.root = dataset;
@@ -43,6 +66,26 @@ cv::Mat Truth::normal(int index) const {
 cv::Mat Truth::flow_px(int index) const {
   const auto file = layout_.flow(index);
   return of_size(read_exr(file), CV_32FC2, camera_.lens, file);
+}
+TriangleMesh Truth::wall(int index) const {
+  const auto file = layout_.wall_motion(index);
+  if (!std::filesystem::exists(file)) return wall_;
+  return moved_wall(wall_, file);
+}
+
+RowPoses Truth::row_poses(int index) const {
+  const auto file = layout_.row_poses(index);
+  if (std::filesystem::exists(file)) return read_row_poses(file, camera_);
+  return RowPoses(track_[static_cast<std::size_t>(index)].world_from_camera);
+}
+
+cv::Mat Truth::backward_flow_px(int index) const {
+  const auto file = layout_.backward_flow(index);
+  return of_size(read_exr(file), CV_32FC2, camera_.lens, file);
+}
+cv::Mat Truth::triangle(int index) const {
+  const auto file = layout_.triangles(index);
+  return of_size(read_exr(file), CV_32FC3, camera_.lens, file);
 }
 cv::Mat Truth::masks(int index) const {
   const auto file = layout_.masks(index);

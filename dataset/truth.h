@@ -7,9 +7,11 @@
 #include <string>
 
 #include "cameras/camera.h"
+#include "cameras/row_poses.h"
 #include "core/mesh.h"
 #include "core/pose_track.h"
 #include "dataset/layout.h"
+#include "dataset/tracks.h"
 
 namespace rugae {
 
@@ -23,7 +25,18 @@ struct FrameTruth {
   cv::Mat backward_flow_px;  // CV_32FC2, to the frame before; empty for the first
   cv::Mat triangle;  // CV_32FC3: index of the wall's triangle and the barycentric coordinates of
                      // its second and third corner; NaN where nothing was hit
+  std::vector<TrackSample> tracks;
+  // Where there is something to say, else empty:
+  PoseTrack row_poses;  // rolling shutter: of rows -1 to height, each at the middle of its exposure
+  std::vector<Vec3f>
+      wall_displacement_mm;  // of the wall's vertices from wall.ply, at the frame's time
 };
+
+/// truth/row_poses/*.txt; throws Error naming the file when it has not a pose for every row.
+RowPoses read_row_poses(const std::filesystem::path& file, const Camera& camera);
+/// The wall at a frame's time, from that at rest and truth/wall_motion/*.ply: without normals.
+/// Throws Error naming the file when it has not one displacement a vertex.
+TriangleMesh moved_wall(const TriangleMesh& rest, const std::filesystem::path& file);
 
 class Truth {
  public:
@@ -32,11 +45,18 @@ class Truth {
   int size() const { return static_cast<int>(track_.size()); }
   const Camera& camera() const { return camera_; }
   const PoseTrack& track() const { return track_; }
-  const TriangleMesh& wall() const { return wall_; }
+  const TriangleMesh& wall() const { return wall_; }  // at rest
+  /// The wall at the frame's time: without normals where it has moved.
+  TriangleMesh wall(int index) const;
+  /// The camera while the frame was read out.
+  RowPoses row_poses(int index) const;
   cv::Mat depth_mm(int index) const;
   cv::Mat normal(int index) const;
   cv::Mat flow_px(int index) const;
   cv::Mat masks(int index) const;
+  cv::Mat backward_flow_px(int index) const;
+  cv::Mat triangle(int index) const;
+  std::vector<TrackSample> tracks(int index) const { return read_tracks(layout_.tracks(index)); }
 
  private:
   DatasetLayout layout_;

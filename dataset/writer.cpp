@@ -1,5 +1,6 @@
 #include "dataset/writer.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "core/check.h"
@@ -17,6 +18,25 @@ namespace {
 
 constexpr int kLayoutVersion = 1;  // raised when readers of the layout must change
 
+json names_of(const TruthFiles& truth) {
+  json names = json::array();
+  if (truth.backward_flow) names.push_back("backward_flow");
+  if (truth.triangles) names.push_back("triangles");
+  if (truth.row_poses) names.push_back("row_poses");
+  if (truth.wall_motion) names.push_back("wall_motion");
+  if (truth.tracks) names.push_back("tracks");
+  if (truth.coverage) names.push_back("coverage");
+  return names;
+}
+
+// Datasets from before there were such files do not name them.
+TruthFiles read_names(const json& object) {
+  const auto names = object.value("truth", json::array()).get<std::vector<std::string>>();
+  const auto has = [&](const char* name) { return std::ranges::find(names, name) != names.end(); };
+  return {has("backward_flow"), has("triangles"), has("row_poses"),
+          has("wall_motion"),   has("tracks"),    has("coverage")};
+}
+
 json as_json(const DatasetInfo& info) {
   json options = json::object();
   if (!info.text.empty()) {
@@ -31,6 +51,7 @@ json as_json(const DatasetInfo& info) {
           {"seed", info.seed},
           {"frames", info.frames},
           {"labels", info.labels},
+          {"truth", names_of(info.truth)},
           {"options", options},
           {"units", {{"length", "mm"}, {"time", "s"}, {"flow", "px"}}},
           {"axes",
@@ -103,6 +124,7 @@ DatasetInfo read_info(const fs::path& file) {
     object.at("seed").get_to(info.seed);
     object.at("frames").get_to(info.frames);
     object.at("labels").get_to(info.labels);
+    info.truth = read_names(object);
     info.text = object.at("options").dump();
   } catch (const json::exception& error) {
     fail("{}: not the description of a dataset: {}", file.string(), error.what());
@@ -127,10 +149,8 @@ DatasetWriter::DatasetWriter(const fs::path& root, const DatasetInfo& info) : in
   }
   make_folder(layout_.frames());
   make_folder(layout_.truth());
-  for (const fs::path& file : image_files(layout_, info.images, 0)) make_folder(file.parent_path());
-  if (info.labels)
-    for (const fs::path& file :
-         {layout_.depth(0), layout_.normals(0), layout_.flow(0), layout_.masks(0)})
+  for (const int index : {0, 1, info.frames - 1})
+    for (const fs::path& file : files_of_frame(layout_, info, index))
       make_folder(file.parent_path());
 }
 
@@ -154,12 +174,30 @@ void DatasetWriter::write_scene(const Camera& camera, const PoseTrack& track,
   height_ = camera.lens.height;
 }
 
+std::vector<fs::path> files_of_frame(const DatasetLayout& layout, const DatasetInfo& info,
+                                     int index) {
+  std::vector<fs::path> files;
+  if (info.labels) {
+    files = {layout.depth(index), layout.normals(index), layout.masks(index)};
+    if (index + 1 < info.frames) files.push_back(layout.flow(index));
+    if (info.truth.backward_flow && index > 0) files.push_back(layout.backward_flow(index));
+    if (info.truth.triangles) files.push_back(layout.triangles(index));
+    if (info.truth.tracks) files.push_back(layout.tracks(index));
+  }
+  if (info.truth.row_poses) files.push_back(layout.row_poses(index));
+  if (info.truth.wall_motion) files.push_back(layout.wall_motion(index));
+  const std::vector<fs::path> images = image_files(layout, info.images, index);
+  files.insert(files.end(), images.begin(), images.end());
+  return files;
+}
+
+void DatasetWriter::write_track_points(const std::vector<TrackPoint>& points) const {
+  write_atomic(layout_.track_points(), track_points_text(points));
+}
+
 bool DatasetWriter::has_frame(int index) const {
-  for (const fs::path& file : image_files(layout_, info_.images, index))
-    if (!fs::exists(file)) return false;
-  if (!info_.labels) return true;
-  return fs::exists(layout_.depth(index)) && fs::exists(layout_.normals(index)) &&
-         fs::exists(layout_.masks(index)) && (!has_flow(index) || fs::exists(layout_.flow(index)));
+  return std::ranges::all_of(files_of_frame(layout_, info_, index),
+                             [](const fs::path& file) { return fs::exists(file); });
 }
 
 void DatasetWriter::write_frame(int index, const cv::Mat& bgr8, const FrameTruth& truth,
@@ -178,6 +216,21 @@ void DatasetWriter::write_frame(int index, const cv::Mat& bgr8, const FrameTruth
     write_normals(layout_.normals(index), truth.normal);
     write_image(layout_.masks(index), truth.masks);
     if (has_flow(index)) write_exr(layout_.flow(index), truth.flow_px);
+    if (info_.truth.backward_flow && index > 0) {
+      check_label(truth.backward_flow_px, CV_32FC2, bgr8, "backward flow", index);
+      write_exr(layout_.backward_flow(index), truth.backward_flow_px);
+    }
+    if (info_.truth.triangles) {
+      check_label(truth.triangle, CV_32FC3, bgr8, "triangle", index);
+      write_exr(layout_.triangles(index), truth.triangle);
+    }
+    if (info_.truth.tracks) write_atomic(layout_.tracks(index), tracks_text(truth.tracks));
+  }
+  if (info_.truth.row_poses) write_atomic(layout_.row_poses(index), tum_text(truth.row_poses));
+  if (info_.truth.wall_motion) {
+    TriangleMesh points;
+    for (const Vec3f& d : truth.wall_displacement_mm) points.vertices.push_back(d.cast<double>());
+    write_ply(layout_.wall_motion(index), points);
   }
   write_images(layout_, info_.images, index, bgr8, extra);
 }
@@ -195,6 +248,11 @@ void DatasetWriter::finish(const std::vector<double>& exposure_s,
     records.push_back({track_[i].time_s, exposure_s[i], gain[i]});
   }
   write_atomic(layout_.frame_list(), frame_list_text(records));
+  if (info_.labels && info_.truth.coverage) {
+    std::vector<fs::path> triangles;
+    for (int i = 0; i < info_.frames; ++i) triangles.push_back(layout_.triangles(i));
+    write_atomic(layout_.coverage(), coverage_text(triangles));
+  }
   remove_temporaries(layout_.root);
   const auto files = files_below(layout_.root, layout_.manifest().filename().string());
   write_atomic(layout_.manifest(), manifest_text(files, hashes_of(layout_.root, files)));

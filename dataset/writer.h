@@ -16,6 +16,14 @@
 
 namespace rugae {
 
+/// Files of truth that not every dataset has.
+struct TruthFiles {
+  bool backward_flow = false, triangles = false;  // where there are labels
+  bool row_poses = false;                         // rolling shutter
+  bool wall_motion = false;                       // moving wall
+  bool tracks = false, coverage = false;          // where there are labels
+};
+
 /// What made a dataset; two runs with the same info write the same bytes.
 struct DatasetInfo {
   std::string scene, camera, trajectory, resolution;
@@ -23,6 +31,7 @@ struct DatasetInfo {
   int frames = 0;
   bool labels = true;  // false: no truth images
   ImageFiles images;
+  TruthFiles truth;
   std::string text;  // every option as a canonical JSON object: a folder begun with another text
                      // is not continued
 };
@@ -31,6 +40,10 @@ struct DatasetInfo {
 std::string info_json(const DatasetInfo& info);
 /// Throws Error naming the file when it is missing, is not JSON, or lacks a field.
 DatasetInfo read_info(const std::filesystem::path& file);
+
+/// The files of one frame, its images last.
+std::vector<std::filesystem::path> files_of_frame(const DatasetLayout& layout,
+                                                  const DatasetInfo& info, int index);
 
 class DatasetWriter {
  public:
@@ -42,6 +55,8 @@ class DatasetWriter {
   /// Throws Error when the track has not one pose a frame, or when an earlier run wrote another
   /// camera, path or wall.
   void write_scene(const Camera& camera, const PoseTrack& track, const TriangleMesh& wall);
+  /// Points that frames follow.
+  void write_track_points(const std::vector<TrackPoint>& points) const;
   /// True when all files of the frame are in place from an earlier run (files appear whole, so
   /// presence suffices).
   bool has_frame(int index) const;

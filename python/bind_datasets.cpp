@@ -44,6 +44,12 @@ struct Dataset {
   DatasetLayout layout;
 };
 
+// A label that not every dataset has.
+py::object image_or_none(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) return py::none();
+  return to_array(read_exr(file));
+}
+
 struct ReadEstimate {
   explicit ReadEstimate(const std::string& folder)
       : layout{folder}, estimate(read_estimate(folder)) {}
@@ -104,6 +110,45 @@ void bind_datasets(py::module_& module) {
           py::arg("index"),
           "float32 (rows, columns, 2) to the next frame; NaN where not valid; None for the last.")
       .def(
+          "backward_flow_px",
+          [](const Dataset& d, int i) { return image_or_none(d.layout.backward_flow(d.index(i))); },
+          py::arg("index"),
+          "float32 (rows, columns, 2) to the frame before; NaN where not valid; None for the first "
+          "frame and for datasets without.")
+      .def(
+          "triangles",
+          [](const Dataset& d, int i) { return image_or_none(d.layout.triangles(d.index(i))); },
+          py::arg("index"),
+          "float32 (rows, columns, 3): triangle of the wall and the barycentric coordinates of its "
+          "second and third corner; NaN where nothing was hit; None for datasets without.")
+      .def(
+          "tracks",
+          [](const Dataset& d, int i) -> py::object {
+            if (!std::filesystem::exists(d.layout.tracks(d.index(i)))) return py::none();
+            std::vector<Eigen::Matrix<double, 5, 1>> rows;
+            for (const TrackSample& s : d.truth.tracks(d.index(i)))
+              rows.push_back(
+                  {double(s.point), s.pixel.x(), s.pixel.y(), s.depth_mm, double(s.visible)});
+            return to_array<5>(rows);
+          },
+          py::arg("index"),
+          "(n, 5): point, x, y, depth in mm, 1 where visible, of the followed points in the image; "
+          "None for datasets without.")
+      .def(
+          "row_poses",
+          [](const Dataset& d, int i) -> py::object {
+            const RowPoses rows = d.truth.row_poses(d.index(i));
+            if (!rows.rolling()) return py::none();
+            return to_matrices(rows.poses());
+          },
+          py::arg("index"),
+          "Matrices (rows + 2, 4, 4) of world_from_camera of rows -1 to `rows`, each in the middle "
+          "of its exposure; None for a global shutter.")
+      .def(
+          "wall_vertices_at_mm",
+          [](const Dataset& d, int i) { return to_array<3>(d.truth.wall(d.index(i)).vertices); },
+          py::arg("index"), "The wall's vertices at the frame's time.")
+      .def(
           "masks", [](const Dataset& d, int i) { return to_array(d.truth.masks(d.index(i))); },
           py::arg("index"), "uint8, bits MASK_VALID, MASK_SPECULAR, ...")
       .def_property_readonly("wall_vertices_mm",
@@ -115,6 +160,8 @@ void bind_datasets(py::module_& module) {
   module.attr("MASK_SATURATED") = static_cast<int>(kMaskSaturated);
   module.attr("MASK_FLOW_VALID") = static_cast<int>(kMaskFlowValid);
   module.attr("MASK_FLOW_OCCLUDED") = static_cast<int>(kMaskFlowOccluded);
+  module.attr("MASK_BACKWARD_FLOW_VALID") = static_cast<int>(kMaskBackwardFlowValid);
+  module.attr("MASK_BACKWARD_FLOW_OCCLUDED") = static_cast<int>(kMaskBackwardFlowOccluded);
 
   py::class_<ReadEstimate>(module, "Estimate", "What a reconstruction left; lengths in map units.")
       .def(py::init<const std::string&>(), py::arg("folder"))

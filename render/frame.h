@@ -6,6 +6,7 @@
 
 #include "dataset/truth.h"
 #include "render/labels.h"
+#include "render/lens_samples.h"
 #include "render/motion.h"
 #include "render/path_trace.h"
 #include "render/surface.h"
@@ -46,12 +47,19 @@ class FrameRenderer {
   CleanFrame render(const Rigid3& world_from_camera, const Rigid3* next,
                     RenderTimes* times = nullptr, int index = 0) const;
 
-  const RayTable& rays() const { return rays_; }
-  const Wall& wall() const { return wall_; }  // at rest
+  /// The radiance alone (CV_32FC3, as in CleanFrame), gathered over pixel, aperture and exposure:
+  /// the mean of the samples.
+  cv::Mat gather(const FrameView& now, const LensSampling& sampling,
+                 RenderTimes* times = nullptr) const;
 
- private:
+  bool needs_previous() const { return options_.labels && options_.choice.backward_flow; }
+  bool needs_next() const { return options_.labels; }
+  const RayTable& rays() const { return rays_; }
+  const LensProjector& lens() const { return lens_; }
+  const Wall& wall() const { return wall_; }  // at rest
   const Wall& wall_of(const FrameView& view) const { return view.wall ? *view.wall : wall_; }
 
+ private:
   Wall wall_;
   Camera camera_;
   RenderOptions options_;

@@ -108,6 +108,9 @@ FrameView Motion::view(int frame) const {
   FrameView view;
   view.index = frame;
   view.fps = options_.fps;
+  view.pose_at = [path = path_, frame, fps = options_.fps](double offset_s) {
+    return path(frame + offset_s * fps);
+  };
   if (motion_) view.wall = wall(frame);
   if (options_.row_time_s > 0.0) {
     std::vector<Rigid3> poses;

@@ -21,8 +21,9 @@ using CameraPath = std::function<Rigid3(double frame)>;
 struct FrameView {
   int index = 0;  // of the frame
   RowPoses camera;
-  std::shared_ptr<const Wall> wall;  // null: the wall at rest
-  double fps = 0.0;                  // one beat of the wall is the time between two frames
+  std::function<Rigid3(double offset_s)> pose_at;  // at other times; empty: not known
+  std::shared_ptr<const Wall> wall;                // null: the wall at rest
+  double fps = 0.0;  // one beat of the wall is the time between two frames
 
   double beat(double offset_s) const { return offset_s * fps; }
   /// What the sharp frame's rows see: one instant for all of them, or one for each.

@@ -8,6 +8,10 @@ namespace rugae {
 template <typename Visitor>
 void fields(Visitor& v, LensSettings& o) {
   v.flag("vignetting", o.vignetting);
+  v.flag("rolling_shutter", o.rolling_shutter);
+  v.number("samples", o.samples, 1, 4095);
+  v.flag("motion_blur", o.motion_blur);
+  v.flag("defocus", o.defocus);
 }
 
 template <typename Visitor>
@@ -45,18 +49,33 @@ void fields(Visitor& v, OutputSettings& o) {
 }
 
 template <typename Visitor>
+void fields(Visitor& v, TruthSettings& o) {
+  v.flag("backward_flow", o.backward_flow);
+  v.flag("triangles", o.triangles);
+  v.number("tracks", o.tracks, 0, 1000000);
+  v.flag("coverage", o.coverage);
+}
+
+template <typename Visitor>
 void fields(Visitor& v, RenderSettings& o) {
   v.section("lens", o.lens);
   v.section("light", o.light);
   v.section("sensor", o.sensor);
   v.section("output", o.output);
   v.flag("labels", o.labels);
+  v.section("truth", o.truth);
 }
 
 void RenderSettings::check() const {
   check_fields(*this, "render");
   rugae::check(!output.mosaic || sensor.bayer != Bayer::none,
                "render.output: mosaic is true, but render.sensor.bayer is none");
+  rugae::check(
+      lens.samples > 1 || !(lens.motion_blur || lens.defocus),
+      "render.lens: {} with samples 1 would be noise alone, expected samples of at least 2",
+      lens.motion_blur ? "motion_blur" : "defocus");
+  rugae::check(!truth.coverage || truth.triangles,
+               "render.truth: coverage is counted from triangles, expected triangles to be true");
 }
 
 void read_settings(YamlReader yaml, RenderSettings& settings) {

@@ -12,6 +12,18 @@ namespace rugae {
 
 struct LensSettings {
   bool vignetting = true;
+  bool rolling_shutter = true;  // where the camera has one
+  int samples = 1;              // rays a pixel; 1: through its centre
+  bool motion_blur = false;     // over the exposure time
+  bool defocus = false;         // thin lens with the camera's f-number and focus
+};
+
+/// Labels beyond depth, normals, forward flow and masks.
+struct TruthSettings {
+  bool backward_flow = false;
+  bool triangles = false;  // triangle and barycentric coordinates of every pixel
+  int tracks = 0;          // points of the wall followed over the sequence
+  bool coverage = false;   // in how many frames each triangle is seen; needs triangles
 };
 
 struct LightSettings {
@@ -25,7 +37,8 @@ struct RenderSettings {
   LightSettings light;
   SensorSettings sensor;
   OutputSettings output;
-  bool labels = true;  // truth images
+  bool labels = true;  // truth images; false: none of them, whatever `truth` says
+  TruthSettings truth;
   /// Throws Error naming the field, its value and its range.
   void check() const;
 };

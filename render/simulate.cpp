@@ -8,6 +8,7 @@
 #include <future>
 #include <memory>
 #include <mutex>
+#include <optional>
 
 #include "core/check.h"
 #include "core/files.h"
@@ -19,6 +20,7 @@
 #include "render/scene_truth.h"
 #include "render/sensor.h"
 #include "render/thread_clock.h"
+#include "render/tracks.h"
 #include "trajectories/trajectory.h"
 
 namespace rugae {
@@ -32,6 +34,7 @@ double seconds_since(Clock::time_point start) {
 
 struct Path {
   PoseTrack track;
+  CameraPath between;  // the frames too
   double length_mm = 0.0, min_clearance_mm = 0.0;
 };
 
@@ -55,15 +58,35 @@ Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajecto
   check_moving_clearance(scene, track, trajectory.clearance_mm + mount.reach_mm,
                          fmt::format("trajectory '{}'", trajectory.name));
   // A camera in the capsule's place keeps the path to the last bit.
-  const Rigid3& capsule_from_camera = mount.capsule_from_camera;
-  if (!capsule_from_camera.translation.isZero(0.0) ||
-      !capsule_from_camera.rotation.vec().isZero(0.0))
-    for (TimedPose& pose : track)
-      pose.world_from_camera = pose.world_from_camera * capsule_from_camera;
-  return {std::move(track), path.length_mm(), path.min_clearance_mm()};
+  const Rigid3 capsule_from_camera = mount.capsule_from_camera;
+  const bool beside = !capsule_from_camera.translation.isZero(0.0) ||
+                      !capsule_from_camera.rotation.vec().isZero(0.0);
+  const auto mounted = [capsule_from_camera, beside](const Rigid3& capsule) {
+    return beside ? capsule * capsule_from_camera : capsule;
+  };
+  for (TimedPose& pose : track) pose.world_from_camera = mounted(pose.world_from_camera);
+  const double last = frames - 1.0;
+  return {std::move(track),
+          [path, last, mounted](double frame) { return mounted(sampled_pose(path, frame / last)); },
+          path.length_mm(), path.min_clearance_mm()};
 }
 
-DatasetInfo info_of(const SimulateOptions& options, const Scene& scene, int frames) {
+double row_time_s(const RenderSettings& render, const Camera& camera) {
+  const bool rolling = render.lens.rolling_shutter && camera.sensor.shutter == Shutter::rolling;
+  return rolling ? 1e-6 * camera.sensor.row_time_us : 0.0;
+}
+
+LensSampling lens_sampling(const LensSettings& lens, const Camera& camera, std::uint64_t seed) {
+  LensSampling sampling{.samples = lens.samples, .seed = seed};
+  if (lens.defocus) {
+    sampling.aperture_radius_mm = aperture_radius_mm(camera);
+    sampling.focus_distance_mm = camera.focus.distance_mm;
+  }
+  return sampling;
+}
+
+DatasetInfo info_of(const SimulateOptions& options, int frames, const Camera& camera,
+                    const Scene& scene) {
   DatasetInfo info;
   info.scene = options.scene;
   info.camera = options.camera;
@@ -79,8 +102,22 @@ DatasetInfo info_of(const SimulateOptions& options, const Scene& scene, int fram
                  output.mosaic,
                  output.radiance,
                  output.paired};
+  const TruthSettings& truth = options.render.truth;
+  info.truth = {truth.backward_flow,
+                truth.triangles,
+                row_time_s(options.render, camera) > 0.0,
+                static_cast<bool>(scene.motion),
+                truth.tracks > 0,
+                truth.coverage};
   info.text = with_scene(settings_json(options.render), scene);
   return info;
+}
+
+PoseTrack row_track(const RowPoses& rows, double time_s) {
+  PoseTrack track;
+  for (std::size_t k = 0; rows.rolling() && k < rows.poses().size(); ++k)
+    track.push_back({time_s + rows.offset_s(static_cast<double>(k) - 0.5), rows.poses()[k]});
+  return track;
 }
 
 // Frames go through a pipeline in the arena's threads; the thread that called waits, counts the
@@ -89,11 +126,12 @@ DatasetInfo info_of(const SimulateOptions& options, const Scene& scene, int fram
 class FrameLoop {
  public:
   // Frames before `first_written` are rendered for their metering alone.
-  FrameLoop(const FrameRenderer& renderer, const SensorModel& sensor,
+  FrameLoop(const FrameRenderer& renderer, const Motion& motion, const SensorModel& sensor,
             const SensorModel& clean_sensor, const ExposureControl& control,
             const OutputSettings& output, const DatasetWriter& writer, const PoseTrack& track,
-            int first_written, ExposureLog* log)
+            int first_written, const LensSampling& sampling, bool blurs, ExposureLog* log)
       : renderer_(renderer),
+        motion_(motion),
         sensor_(sensor),
         clean_sensor_(clean_sensor),
         control_(control),
@@ -101,6 +139,8 @@ class FrameLoop {
         writer_(writer),
         track_(track),
         first_written_(first_written),
+        sampling_(sampling),
+        blurs_(blurs),
         log_(log) {}
 
   void run(const std::vector<int>& frames, int threads, Progress& progress,
@@ -139,6 +179,7 @@ class FrameLoop {
   }
 
   RenderTimes times;
+  std::vector<TrackPoint> track_points;  // to be followed
   std::atomic<double> sensor_s = 0.0, encode_s = 0.0, write_s = 0.0;
 
  private:
@@ -174,12 +215,25 @@ class FrameLoop {
     tbb::parallel_pipeline(in_flight, first & rendered & exposed & written);
   }
 
+  // What the sharp frame was metered for, gathered over pixel, aperture and exposure.
+  cv::Mat gather(int frame, double exposure_s) {
+    LensSampling sampling = sampling_;
+    sampling.frame = static_cast<std::uint32_t>(frame);
+    sampling.exposure_s = blurs_ ? exposure_s : 0.0;
+    return renderer_.gather(motion_.view(frame), sampling, &times);
+  }
+
   ShotPtr shoot(int frame) {
-    const auto i = static_cast<std::size_t>(frame);
-    const bool last = i + 1 == track_.size();
+    const FrameView now = motion_.view(frame);
+    std::optional<FrameView> previous, next;
+    if (frame > 0 && renderer_.needs_previous()) previous = motion_.view(frame - 1);
+    if (frame + 1 < static_cast<int>(track_.size()) && renderer_.needs_next())
+      next = motion_.view(frame + 1);
     CleanFrame clean =
-        renderer_.render(track_[i].world_from_camera,
-                         last ? nullptr : &track_[i + 1].world_from_camera, &times, frame);
+        renderer_.render(now, previous ? &*previous : nullptr, next ? &*next : nullptr, &times);
+    clean.truth.row_poses = row_track(now.camera, track_[static_cast<std::size_t>(frame)].time_s);
+    clean.truth.wall_displacement_mm = motion_.displacement_mm(frame);
+    if (!track_points.empty()) clean.truth.tracks = follow_tracks(renderer_, now, track_points);
     const double start = thread_seconds();
     const Exposure metered = sensor_.expose(clean.radiance);
     sensor_s += thread_seconds() - start;
@@ -203,9 +257,10 @@ class FrameLoop {
   }
 
   void write(Shot& shot) {
-    const cv::Mat& radiance = shot.clean.radiance;
     FrameTruth& truth = shot.clean.truth;
     const Exposure& exposure = shot.exposure.used;
+    const cv::Mat& sharp = shot.clean.radiance;
+    const cv::Mat radiance = sampling_.samples > 1 ? gather(shot.frame, exposure.time_s) : sharp;
     const SensorImages images =
         sensor_.digitise(radiance, exposure, shot.frame, truth.masks, output_.adc, &sensor_s);
     ExtraImages extra{images.adc_bgr, images.mosaic, {}, {}};
@@ -213,7 +268,7 @@ class FrameLoop {
     if (output_.paired) {
       cv::Mat unused(radiance.size(), CV_8U, cv::Scalar(0));
       extra.clean =
-          clean_sensor_.digitise(radiance, exposure, shot.frame, unused, false, &sensor_s).bgr;
+          clean_sensor_.digitise(sharp, exposure, shot.frame, unused, false, &sensor_s).bgr;
     }
     {
       const std::lock_guard lock(mutex_);
@@ -227,12 +282,15 @@ class FrameLoop {
   }
 
   const FrameRenderer& renderer_;
+  const Motion& motion_;
   const SensorModel &sensor_, &clean_sensor_;
   const ExposureControl& control_;
   const OutputSettings& output_;
   const DatasetWriter& writer_;
   const PoseTrack& track_;
   int first_written_;
+  LensSampling sampling_;
+  bool blurs_;  // over the exposure
   ExposureLog* log_;
   std::map<int, FrameExposure>* exposures_ = nullptr;
   std::atomic<bool> stop_ = false;
@@ -269,6 +327,9 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
 
   progress.begin("scene");
   const Camera& camera = mount.camera;
+  check(!options.render.lens.defocus || camera.focus.f_number > 0.0,
+        "camera '{}' has no focus (f_number and distance_mm), which lens.defocus needs",
+        camera.name);
   const TrajectoryOptions trajectory = load_trajectory(options.trajectory);
   make_folder(out);  // a folder that cannot be is said before the long work, not after
   const Scene scene = load_scene({options.scene, options.seed, options.resolution, trajectory.oil});
@@ -283,7 +344,7 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
 
   const bool whole = options.only_frame < 0;
   std::map<int, FrameExposure> exposures = ExposureLog::read(out);
-  DatasetWriter writer(out, info_of(options, scene, frames));
+  DatasetWriter writer(out, info_of(options, frames, camera, scene));
   writer.write_scene(camera, path.track, scene.wall);
   write_scene_truth(scene, writer.layout().truth());
   const ExposureControl control(camera.sensor, options.render.sensor);
@@ -305,18 +366,32 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
   progress.begin("frames", metered.size() + todo.size());
   if (!todo.empty()) {
     const LightSettings& light = options.render.light;
+    const TruthSettings& truth = options.render.truth;
     const FrameRenderer renderer(
         scene, camera,
         {.vignetting = options.render.lens.vignetting,
          .labels = options.render.labels,
+         .choice = {truth.backward_flow, truth.triangles},
          .paths = {light.bounces, light.samples, light.roulette, mount.noise_seed}});
+    const Motion motion(renderer.wall(), scene.motion, path.between,
+                        {.frames = frames,
+                         .fps = camera.sensor.fps,
+                         .height = camera.lens.height,
+                         .row_time_s = row_time_s(options.render, camera),
+                         .moves_within = options.render.lens.motion_blur,
+                         .in_flight = 2 * threads});
     const SensorModel sensor(
         camera.sensor, {options.render.sensor, trajectory.read_noise_factor, mount.noise_seed});
     const SensorModel clean_sensor(camera.sensor, faultless({options.render.sensor}));
     ExposureLog log(out, exposures);
     todo.insert(todo.begin(), metered.begin(), metered.end());
-    FrameLoop loop(renderer, sensor, clean_sensor, control, options.render.output, writer,
-                   path.track, first, &log);
+    FrameLoop loop(renderer, motion, sensor, clean_sensor, control, options.render.output, writer,
+                   path.track, first, lens_sampling(options.render.lens, camera, mount.noise_seed),
+                   options.render.lens.motion_blur, &log);
+    if (options.render.labels && truth.tracks > 0) {
+      loop.track_points = choose_track_points(renderer, motion, frames, truth.tracks, options.seed);
+      writer.write_track_points(loop.track_points);
+    }
     const Clock::time_point loop_start = Clock::now();
     loop.run(todo, threads, progress, exposures);
     result.wall_s = seconds_since(loop_start);

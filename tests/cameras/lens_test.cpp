@@ -169,7 +169,40 @@ TEST(Camera, ErrorsNameThePlace) {
             file.string() + ":31:16: black_level is 513, expected 0 to 512");
   EXPECT_EQ(with("  k1: -0.2", "  k1: -2.0 #"),
             file.string() + ":5:3: the distortion has no inverse at the image corner (0, 0)");
+  EXPECT_EQ(with("  shutter: global", "  shutter: global\n  row_time_us: 20"),
+            file.string() + ":29:16: row_time_us is given, but the shutter is global");
+  EXPECT_EQ(with("  shutter: global", "  shutter: rolling\n  row_time_us: 90"),
+            file.string() +
+                ":29:16: row_time_us is 90, expected above 0 and at most 69.4444 (480 "
+                "rows at 30 frames a second)");
+  EXPECT_EQ(with("  f_number: 5", "  f_number: 0"),
+            file.string() + ":33:13: f_number is 0, expected 0.5 to 100");
   std::filesystem::remove(file);
+}
+
+TEST(Camera, ARollingShutterReadsWithinTheFrame) {
+  const Camera naneye = load_camera("awaiba-naneye");
+  EXPECT_EQ(naneye.sensor.row_time_us, 90.0);
+  EXPECT_EQ(load_camera("misumi-v5506").sensor.row_time_us, 0.0);
+  const auto file = std::filesystem::temp_directory_path() / "rugae_camera_rolling.yaml";
+  const std::string text = camera_yaml(naneye);
+  write_atomic(file, text);
+  EXPECT_EQ(camera_yaml(load_camera(file.string())), text);
+  // Where a file does not say, reading takes the whole of the frame's time.
+  const std::size_t line = text.find("  row_time_us");
+  write_atomic(file, text.substr(0, line) + text.substr(text.find('\n', line) + 1));
+  EXPECT_DOUBLE_EQ(load_camera(file.string()).sensor.row_time_us, 1e6 / (44.0 * 250.0));
+  std::filesystem::remove(file);
+}
+
+TEST(Camera, TheApertureIsTheFocalLengthOverTheFNumber) {
+  Camera camera = load_camera("misumi-v5506");
+  camera.lens.fx = 250.0;
+  camera.sensor.pixel_pitch_um = 6.0;  // 1.5 mm of focal length
+  camera.focus.f_number = 5.0;
+  EXPECT_DOUBLE_EQ(aperture_radius_mm(camera), 0.15);
+  camera.focus = {};
+  EXPECT_EQ(aperture_radius_mm(camera), 0.0);
 }
 
 TEST(Vignetting, CosineFourthAndPolynomial) {

@@ -3,12 +3,13 @@
 #include <gtest/gtest.h>
 
 #include "render/frame.h"
-#include "tests/render/walls.h"
+#include "tests/render/moving_world.h"
 
 namespace rugae {
 namespace {
 
 using test::lambert;
+using test::project_again;
 using test::small_camera;
 
 FrameRenderer renderer_of(const TriangleMesh& wall, const Camera& camera) {
@@ -80,14 +81,6 @@ TEST(Labels, SurfacePointsLandOnTheMesh) {
       const Vec3 point = pose * (truth.depth_mm.ptr<float>(y)[x] / ray.z() * ray);
       ASSERT_TRUE(closest(point).distance_mm <= kExact_mm) << x << " " << y;
     }
-}
-
-// Brown-Conrady written out once more, independent of the camera's own code.
-Vec2 project_again(const Lens& lens, const Vec3& p) {
-  const double x = p.x() / p.z(), y = p.y() / p.z(), r2 = x * x + y * y;
-  const double radial = 1.0 + lens.k1 * r2 + lens.k2 * r2 * r2 + lens.k3 * r2 * r2 * r2;
-  return {lens.fx * (x * radial + 2.0 * lens.p1 * x * y + lens.p2 * (r2 + 2.0 * x * x)) + lens.cx,
-          lens.fy * (y * radial + lens.p1 * (r2 + 2.0 * y * y) + 2.0 * lens.p2 * x * y) + lens.cy};
 }
 
 struct Pair {

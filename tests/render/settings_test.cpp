@@ -67,5 +67,26 @@ TEST(Settings, MistakesOfTheLightAreNamedToTheLetter) {
             "light.bounce=2:1:10: unknown key 'bounce'; did you mean 'bounces'?");
 }
 
+TEST(Settings, SamplesBlurAndLabels) {
+  RenderSettings settings;
+  const auto change = [&](const std::string& text) {
+    RenderSettings broken;
+    return message_of([&] { change_setting(text, broken); });
+  };
+  EXPECT_EQ(change("lens.samples=0"), "lens.samples=0:1:18: samples is 0, expected 1 to 4095");
+  EXPECT_NE(change("truth.triangle=true").find("did you mean 'triangles'?"), std::string::npos);
+  change_setting("lens.motion_blur=true", settings);
+  EXPECT_EQ(message_of([&] { settings.check(); }),
+            "render.lens: motion_blur with samples 1 would be noise alone, expected samples of at "
+            "least 2");
+  change_setting("lens.samples=2", settings);
+  change_setting("lens.defocus=true", settings);
+  change_setting("truth.backward_flow=true", settings);
+  settings.check();
+  EXPECT_TRUE(settings.lens.rolling_shutter);
+  EXPECT_TRUE(settings.truth.backward_flow);
+  EXPECT_FALSE(settings.truth.triangles);
+}
+
 }  // namespace
 }  // namespace rugae

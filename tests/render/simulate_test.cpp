@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <map>
 #include <opencv2/core.hpp>
+#include <set>
 #include <thread>
 
 #include "core/check.h"
@@ -118,6 +119,95 @@ TEST_F(Simulate, TwoRunsAndAnyThreadsWriteTheSameBytes) {
   run("two");
   expect_same("one", "again");
   expect_same("one", "two");
+}
+
+// A wall that moves, rows exposed one after the other, every label.
+TEST_F(Simulate, AMovingWallThroughARollingShutter) {
+  write_atomic(root_ / "scene.yaml",
+               "kind: mesh\nmesh: wall.ply\ntarget_edge_mm: 4\nwith_relief: false\n"
+               "deformation: {peristalsis: true, breathing: true, waves_per_minute: 3, "
+               "breaths_per_minute: 30}\n");
+  write_atomic(root_ / "camera.yaml",
+               "name: small\nframes_in_paper: 6\ndiameter_mm: 4\n"
+               "lens: {model: brown_conrady, width: 64, height: 48, horizontal_fov_deg: 90, "
+               "k1: -0.1}\n"
+               "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 9000, "
+               "read_noise_e: 5, shutter: rolling, row_time_us: 500}\n");
+  options_.render.truth = {
+      .backward_flow = true, .triangles = true, .tracks = 50, .coverage = true};
+  options_.threads = 1;
+  run("whole");
+  const DatasetCheck found = check_dataset(root_ / "whole");
+  EXPECT_EQ(found.problems, std::vector<std::string>{});
+  EXPECT_TRUE(found.worst_flow_px >= 0.0 && found.worst_flow_px <= 0.01) << found.worst_flow_px;
+
+  const Truth truth = Truth::open(root_ / "whole");
+  const RowPoses rows = truth.row_poses(3);
+  ASSERT_TRUE(rows.rolling());
+  EXPECT_EQ(rows.poses().size(), 50u);
+  EXPECT_NEAR((rows.at(24.0).translation - truth.track()[3].world_from_camera.translation).norm(),
+              0.0, 1e-3);
+  EXPECT_GT((rows.of_row(47).translation - rows.of_row(0).translation).norm(), 0.5);
+  EXPECT_NE(truth.wall(0).vertices, truth.wall(6).vertices);
+  EXPECT_EQ(truth.wall(0).triangles, truth.wall().triangles);
+  EXPECT_FALSE(fs::exists(DatasetLayout{root_ / "whole"}.backward_flow(0)));
+  EXPECT_GT(truth.tracks(0).size(), 5u);
+  std::map<int, int> frames_of;
+  for (int i = 0; i < 7; ++i) {
+    std::set<int> seen;
+    const cv::Mat labels = truth.triangle(i);
+    for (int k = 0; k < 64 * 48; ++k) seen.insert(static_cast<int>(labels.ptr<Vec3f>()[k][0]));
+    for (const int triangle : seen) ++frames_of[triangle];
+  }
+  std::string coverage = "triangle,frames\n";
+  for (const auto& [triangle, frames] : frames_of)
+    coverage += fmt::format("{},{}\n", triangle, frames);
+  EXPECT_EQ(read_text(DatasetLayout{root_ / "whole"}.coverage()), coverage);
+
+  options_.threads = 2;
+  run("killed");
+  const DatasetLayout layout{root_ / "killed"};
+  fs::remove(layout.manifest());
+  fs::remove(layout.frame_list());
+  for (int i = 2; i < 7; ++i) fs::remove(layout.wall_motion(i));
+  EXPECT_EQ(run("killed").frames, 7);  // the exposures went with frames.csv
+  expect_same("whole", "killed");
+
+  options_.render.lens.rolling_shutter = false;
+  run("at once");
+  EXPECT_FALSE(fs::exists(DatasetLayout{root_ / "at once"}.row_poses(0)));
+  EXPECT_EQ(check_dataset(root_ / "at once").problems, std::vector<std::string>{});
+  EXPECT_EQ(read_text(DatasetLayout{root_ / "at once"}.wall_motion(2)),
+            read_text(layout.wall_motion(2)));
+}
+
+TEST_F(Simulate, BlurAndDefocusLeaveTheLabelsSharp) {
+  write_atomic(root_ / "camera.yaml",
+               read_text(root_ / "camera.yaml") + "focus: {f_number: 0.5, distance_mm: 200}\n");
+  options_.frames = 3;
+  options_.render.sensor.noise = false;
+  run("sharp");
+  options_.render.lens.samples = 8;
+  run("smooth");
+  options_.render.lens.motion_blur = true;
+  run("blurred");
+  options_.render.lens.defocus = true;
+  options_.threads = 2;
+  run("soft");
+  options_.threads = 1;
+  run("again");
+  expect_same("soft", "again");
+  const auto image = [&](const char* name) {
+    return read_text(DatasetLayout{root_ / name}.frame(1));
+  };
+  EXPECT_NE(image("sharp"), image("smooth"));
+  EXPECT_NE(image("smooth"), image("blurred"));
+  EXPECT_NE(image("blurred"), image("soft"));
+  const DatasetLayout sharp{root_ / "sharp"}, soft{root_ / "soft"};
+  EXPECT_EQ(read_text(sharp.depth(1)), read_text(soft.depth(1)));
+  EXPECT_EQ(read_text(sharp.flow(1)), read_text(soft.flow(1)));
+  EXPECT_EQ(read_text(sharp.frame_list()), read_text(soft.frame_list()));  // metered on the sharp
+  EXPECT_EQ(check_dataset(root_ / "soft").problems, std::vector<std::string>{});
 }
 
 TEST_F(Simulate, AKilledRunGoesOn) {
@@ -327,6 +417,10 @@ TEST_F(Simulate, SaysWhatIsWrong) {
                   .starts_with("camera 'misumi-v550': no such preset; did you mean "
                                "'misumi-v5506'?"));
   EXPECT_FALSE(fs::exists(root_ / "x"));  // nothing is begun that cannot be finished
+  options = options_;
+  options.render.lens = {.samples = 4, .defocus = true};
+  EXPECT_EQ(text_of(options, root_ / "x"),
+            "camera 'small' has no focus (f_number and distance_mm), which lens.defocus needs");
   // A file stands where the folder should be.
   write_atomic(root_ / "taken", "");
   EXPECT_NE(text_of(options_, root_ / "taken").find("taken"), std::string::npos);
