@@ -8,28 +8,29 @@ scripts/build.sh release rugae
 mkdir -p "$out/frames"
 pictures=()
 
-# frame NAME INDEX OPTION...: that frame of a path of 720 frames.
+# frame NAME INDEX OPTION...: that frame of a path of 720 frames, with its labels in OUT/data.
 frame() {
   local name=$1 index=$2 data="$out/data"
   shift 2
   rm -rf "$data"
   build/release/apps/rugae simulate --frames 720 --only-frame "$index" --out "$data" "$@" >/dev/null
-  mv "$data/observations/frames/$(printf %06d "$index").png" "$out/frames/$name.png"
+  cp "$data/observations/frames/$(printf %06d "$index").png" "$out/frames/$name.png"
   pictures+=("$out/frames/$name.png")
 }
 
-for camera in awaiba-naneye misumi-v3506 misumi-v5506 potensic-mini; do frame "$camera" 200 --camera "$camera" --no-labels; done
-for trajectory in 1 2 3 4 5 6; do frame "trajectory $trajectory" 480 --trajectory "$trajectory" --no-labels; done
-frame "without noise" 480 --clean --no-labels
-frame "dirty" 480 --options scripts/contact_sheet/dirty.yaml --no-labels
-frame "two bounces" 480 --set light.bounces=2 light.samples=64 --no-labels
-frame "lesions" 300 --scene scripts/contact_sheet/lesions.yaml --no-labels
-frame "bubbles, mucus, debris" 300 --scene scripts/contact_sheet/objects.yaml --no-labels
-for time in 0 150 300 450; do
-  frame "peristalsis, $((time / 30)) s" "$time" --scene stomach-moving --trajectory scripts/contact_sheet/antrum.yaml --no-labels
-done
+for camera in awaiba-naneye misumi-v3506 misumi-v5506 potensic-mini; do frame "$camera" 200 --camera "$camera"; done
+for trajectory in 1 2 3 4 5 6; do frame "trajectory $trajectory" 480 --trajectory "$trajectory"; done
+frame "6 without oil and noise" 480 --trajectory scripts/contact_sheet/6-without-oil.yaml --clean
+frame "lens, sensor, exposure" 480 --trajectory 4 --set lens.samples=16 lens.motion_blur=true lens.defocus=true \
+  sensor.bayer=rggb sensor.prnu=true sensor.dsnu=true
+frame "no interreflection" 350 --set light.bounces=0
+frame "two bounces" 350 --set light.bounces=2 light.samples=64
+frame "mucus, bubbles, debris" 200 --scene stomach-unclean
+frame "lesions" 200 --scene stomach-lesions
+for time in 0 5 10 15; do frame "peristalsis, $time s" $((30 * time)) --scene stomach-moving --trajectory scripts/contact_sheet/antrum.txt; done
 
-frame "all labels" 480 --scene scripts/contact_sheet/lesions.yaml --set labels=true
-build/release/apps/rugae picture "$out/data" --frame 480 --labels --out "$out/labels.png"
-build/release/apps/rugae picture "${pictures[@]}" --columns 4 --out "$out/contact_sheet.png"
+frame "all labels" 200 --scene stomach-lesions --set truth.backward_flow=true truth.triangles=true
+build/release/apps/rugae picture "$out/data" --frame 200 --labels --out "$out/labels.png"
+build/release/apps/rugae picture "${pictures[@]::${#pictures[@]}-1}" --columns 4 --out "$out/contact_sheet.png"
+rm -rf "$out/data"
 echo "open $out/contact_sheet.png and $out/labels.png"
