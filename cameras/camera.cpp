@@ -11,6 +11,7 @@ namespace rugae {
 namespace {
 
 const std::vector<std::string> kLensModels = {"brown_conrady", "kannala_brandt"};
+const std::vector<std::string> kStops = {"full", "circle", "octagon"};
 const std::vector<std::string> kShutters = {"global", "rolling"};
 
 // fx so that the ray through the middle of the left border makes half the horizontal field of view
@@ -45,6 +46,11 @@ Lens read_lens(YamlReader yaml, const std::string& place) {
     yaml.get("p1", lens.p1);
     yaml.get("p2", lens.p2);
   }
+  int stop = 0;
+  yaml.get_choice("field_stop", kStops, stop);
+  lens.stop.shape = static_cast<StopShape>(stop);
+  yaml.get("field_stop_radius", lens.stop.radius);
+  lens.stop.check(yaml.where("field_stop_radius"));
   lens.cx = 0.5 * lens.width;
   lens.cy = 0.5 * lens.height;
   yaml.get("cx", lens.cx);
@@ -212,6 +218,10 @@ std::string lens_lines(const Lens& lens, const std::string& indent) {
   } else {
     number("p1", lens.p1);
     number("p2", lens.p2);
+  }
+  if (lens.stop.shape != StopShape::full) {
+    text += fmt::format("{}field_stop: {}\n", indent, kStops[static_cast<int>(lens.stop.shape)]);
+    number("field_stop_radius", lens.stop.radius);
   }
   return text;
 }

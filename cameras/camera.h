@@ -7,6 +7,7 @@
 #include <string>
 
 #include "cameras/emitter.h"
+#include "cameras/field_stop.h"
 #include "core/types.h"
 
 namespace rugae {
@@ -24,6 +25,7 @@ struct Lens {
   double k1 = 0.0, k2 = 0.0, k3 = 0.0;
   double p1 = 0.0, p2 = 0.0;  // Brown-Conrady only
   double k4 = 0.0;            // Kannala-Brandt only
+  FieldStop stop;
 
   /// Pixel of a point in camera coordinates; empty when the model does not see it: at or behind the
   /// centre's plane (Brown-Conrady), beyond the angle to which the model is monotonic, or not
@@ -34,13 +36,18 @@ struct Lens {
   /// normalised coordinates; empty where the model has no inverse (beyond its turning point).
   std::optional<Vec3> unproject(const Vec2& pixel) const;
 
+  /// Within the image and the field stop.
   bool contains(const Vec2& pixel) const {
-    return pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < width && pixel.y() < height;
+    return pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < width && pixel.y() < height &&
+           passes_stop(pixel);
+  }
+  bool passes_stop(const Vec2& pixel) const {
+    return stop.passes({pixel.x() - cx, pixel.y() - cy}, 0.5 * (width < height ? width : height));
   }
   /// The intrinsic matrix in this convention (first pixel centre at 0.5).
   Mat3 matrix() const;
   /// The same lens without distortion (an undistorted image's lens): same matrix and size,
-  /// Brown-Conrady, all k and p zero.
+  /// Brown-Conrady, all k and p zero, no field stop (its outline would be bent).
   Lens pinhole() const;
   /// Largest angle from the axis, rad, to which the model is monotonic and may be used (pi/2 at
   /// most for Brown-Conrady).
@@ -56,6 +63,7 @@ class LensProjector {
   explicit LensProjector(const Lens& lens);
   std::optional<Vec2> project(const Vec3& p_cam) const;
   std::optional<Vec3> unproject(const Vec2& pixel) const;
+  bool contains(const Vec2& pixel) const { return lens_.contains(pixel); }
 
  private:
   Lens lens_;

@@ -71,9 +71,7 @@ void label_flow(const Tile& tile, const RayTable& rays, const LensProjector& len
       landing = lens.project(cam_from_world * (point_world[lane] - pose.translation));
       if (!landing) continue;
     }
-    if (landing->x() < 0.0 || landing->y() < 0.0 || landing->x() >= rays.width ||
-        landing->y() >= rays.height)
-      continue;
+    if (!lens.contains(*landing)) continue;
     lands[lane] = 1;
     const Vec3 normal = seen[lane].side * other.wall.geometric_normal(tile.hit[lane].triangle,
                                                                       other.view.beat(offset_s));

@@ -40,6 +40,14 @@ RayTable make_ray_table(const Lens& lens, const Vignetting& vignetting) {
           static_cast<float>(std::sqrt(dx.cross(dy).norm()));
     }
   }
+  // The stop comes last: the pixels beside it keep their size.
+  for (int y = 0; y < lens.height; ++y)
+    for (int x = 0; x < lens.width; ++x)
+      if (!lens.passes_stop({x + 0.5, y + 0.5})) {
+        const std::size_t i = static_cast<std::size_t>(y) * lens.width + x;
+        table.directions_cam[i] = Vec3::Zero();
+        table.vignetting[i] = 0.0f;
+      }
   return table;
 }
 

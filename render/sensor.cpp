@@ -89,6 +89,15 @@ SensorModel::SensorModel(const Sensor& sensor, const SensorOptions& options)
       adc_top_((1 << sensor.bit_depth) - 1),
       display_(options.chain.tone, sensor.black_level, adc_top_) {}
 
+cv::Mat blanked_by_stop(const Lens& lens) {
+  if (lens.stop.shape == StopShape::full) return {};
+  cv::Mat blanked(lens.height, lens.width, CV_8U, cv::Scalar(0));
+  for (int y = 0; y < lens.height; ++y)
+    for (int x = 0; x < lens.width; ++x)
+      if (!lens.passes_stop({x + 0.5, y + 0.5})) blanked.at<unsigned char>(y, x) = 255;
+  return blanked;
+}
+
 SensorOptions faultless(SensorOptions options) {
   SensorSettings& chain = options.chain;
   chain.noise = chain.prnu = chain.dsnu = false;
@@ -143,6 +152,15 @@ DisplayTable SensorModel::table_for(const cv::Mat& radiance, const Exposure& exp
   return {chain.tone, sensor_.black_level, adc_top_, gains};
 }
 
+void SensorModel::blank(SensorImages& images, cv::Mat& masks) const {
+  if (options_.blanked.empty()) return;
+  const auto black = cv::Scalar::all(sensor_.black_level);
+  masks.setTo(0, options_.blanked);
+  images.bgr.setTo(0, options_.blanked);
+  if (!images.adc_bgr.empty()) images.adc_bgr.setTo(black, options_.blanked);
+  if (!images.mosaic.empty()) images.mosaic.setTo(black, options_.blanked);
+}
+
 SensorImages SensorModel::digitise(const cv::Mat& radiance, const Exposure& exposure, int frame,
                                    cv::Mat& masks, bool keep_adc,
                                    std::atomic<double>* time_s) const {
@@ -182,7 +200,10 @@ SensorImages SensorModel::digitise(const cv::Mat& radiance, const Exposure& expo
     }
   };
   for_rows(radiance.rows, time_s, expose_row);
-  if (bayer == Bayer::none) return images;
+  if (bayer == Bayer::none) {
+    blank(images, masks);
+    return images;
+  }
 
   const double start = thread_seconds();
   const cv::Mat numbers = demosaic(images.mosaic, bayer);
@@ -194,6 +215,7 @@ SensorImages SensorModel::digitise(const cv::Mat& radiance, const Exposure& expo
       for (int c = 0; c < 3; ++c) out[x][2 - c] = table(c, in[x][2 - c]);
   });
   if (keep_adc) images.adc_bgr = numbers;
+  blank(images, masks);
   return images;
 }
 

@@ -17,6 +17,7 @@ struct SensorOptions {
   double read_noise_factor = 1.0;  // added sensor noise: the read noise times this
   std::uint64_t seed = 1;
   std::uint32_t camera = 0;  // cameras of one seed have noise and patterns of their own
+  cv::Mat blanked;           // CV_8U, 255 where the camera makes its pixels black; may be empty
 };
 
 /// Electrons of a pixel: Poisson of the mean, plus normal read noise.
@@ -42,6 +43,9 @@ class ElectronNoise {
   NormalTable normal_;
   PoissonTable poisson_;
 };
+
+/// The pixels whose centres the field stop covers, for SensorOptions; empty when it covers none.
+cv::Mat blanked_by_stop(const Lens& lens);
 
 /// The same chain without its faults: no noise, no fixed patterns, no mosaic.
 SensorOptions faultless(SensorOptions options);
@@ -81,6 +85,7 @@ class SensorModel {
  private:
   std::array<float, 3> measure(const Vec3f& light, float to_electrons, int frame,
                                std::uint64_t pixel) const;
+  void blank(SensorImages& images, cv::Mat& masks) const;
   DisplayTable table_for(const cv::Mat& radiance, const Exposure& exposure) const;
 
   Sensor sensor_;

@@ -380,9 +380,12 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
                          .row_time_s = row_time_s(options.render, camera),
                          .moves_within = options.render.lens.motion_blur,
                          .in_flight = 2 * threads});
-    const SensorModel sensor(
-        camera.sensor, {options.render.sensor, trajectory.read_noise_factor, mount.noise_seed});
-    const SensorModel clean_sensor(camera.sensor, faultless({options.render.sensor}));
+    const SensorOptions sensing{.chain = options.render.sensor,
+                                .read_noise_factor = trajectory.read_noise_factor,
+                                .seed = mount.noise_seed,
+                                .blanked = blanked_by_stop(camera.lens)};
+    const SensorModel sensor(camera.sensor, sensing),
+        clean_sensor(camera.sensor, faultless(sensing));
     ExposureLog log(out, exposures);
     todo.insert(todo.begin(), metered.begin(), metered.end());
     FrameLoop loop(renderer, motion, sensor, clean_sensor, control, options.render.output, writer,

@@ -69,7 +69,10 @@ struct FrameSource::Impl {
       undistortion.emplace(observations.lens(), lens);
       valid = undistortion->valid();
     } else {
-      valid = cv::Mat(lens.height, lens.width, CV_8U, cv::Scalar(255));
+      valid = cv::Mat(lens.height, lens.width, CV_8U, cv::Scalar(0));
+      for (int y = 0; y < lens.height; ++y)
+        for (int x = 0; x < lens.width; ++x)
+          if (lens.passes_stop({x + 0.5, y + 0.5})) valid.at<unsigned char>(y, x) = 255;
     }
     if (options.devignette) estimate_gain();
   }

@@ -9,6 +9,15 @@ namespace {
 constexpr float kNowherePx = -1e4F;   // far outside every image
 constexpr double kRoundingPx = 1e-6;  // a lens' inverse comes back to within this
 
+// Where cubic interpolation takes no pixel that the field stop made black: two to each side.
+bool within_stop(const Lens& lens, const Vec2& pixel) {
+  constexpr double kReachPx = 2.0;
+  for (const double dx : {-kReachPx, kReachPx})
+    for (const double dy : {-kReachPx, kReachPx})
+      if (!lens.passes_stop(pixel + Vec2(dx, dy))) return false;
+  return true;
+}
+
 }  // namespace
 
 Undistortion::Undistortion(const Lens& from, const Lens& to)
@@ -25,7 +34,7 @@ Undistortion::Undistortion(const Lens& from, const Lens& to)
       const double low = 0.5 - kRoundingPx, right = from.width - low, bottom = from.height - low;
       const bool inside =
           pixel->x() >= low && pixel->x() <= right && pixel->y() >= low && pixel->y() <= bottom;
-      if (inside) valid_.at<unsigned char>(y, x) = 255;
+      if (inside && within_stop(from, *pixel)) valid_.at<unsigned char>(y, x) = 255;
     }
   }
 }
