@@ -13,11 +13,11 @@
 namespace rugae {
 
 struct SensorOptions {
-  SensorSettings chain;
+  SensorSettings chain = {};
   double read_noise_factor = 1.0;  // added sensor noise: the read noise times this
   std::uint64_t seed = 1;
   std::uint32_t camera = 0;  // cameras of one seed have noise and patterns of their own
-  cv::Mat blanked;           // CV_8U, 255 where the camera makes its pixels black; may be empty
+  cv::Mat blanked = {};      // CV_8U, 255 where the camera makes its pixels black; may be empty
 };
 
 /// Electrons of a pixel: Poisson of the mean, plus normal read noise.

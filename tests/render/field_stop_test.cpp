@@ -66,7 +66,7 @@ TEST(FieldStop, WhatItCoversIsBlackAndHasNoLabels) {
   const FrameRenderer stopped(Surface(wall, material), camera, {});
   const Rigid3 pose, next(Quat::Identity(), Vec3(2.0, 0.0, 0.0));
   CleanFrame frame = stopped.render(pose, &next), whole = open.render(pose, &next);
-  const SensorModel sensor(camera.sensor, {.chain = {}, .blanked = blanked_by_stop(camera.lens)});
+  const SensorModel sensor(camera.sensor, {.blanked = blanked_by_stop(camera.lens)});
   const cv::Mat bgr =
       sensor.digitise(frame.radiance, sensor.expose(frame.radiance), 0, frame.truth.masks).bgr;
   int covered = 0, left = 0;
