@@ -39,8 +39,8 @@ class Checker {
     if (track) check_track(*track, info.frames);
     if (track) check_times(*track, info.frames);
     if (camera) check_frames(camera->lens, info.frames);
-    const bool labelled = camera && track && wall && info.labels &&
-                          static_cast<int>(track->size()) == info.frames;
+    const bool labelled =
+        camera && track && wall && info.labels && static_cast<int>(track->size()) == info.frames;
     if (labelled) check_all_labels({layout_, camera->lens, *track, &*camera, &*wall}, info);
     // Colour is led from frame to frame by one pose a frame and a wall that keeps still.
     if (labelled && problems_.none() && !info.truth.row_poses && !info.truth.wall_motion)
@@ -111,7 +111,8 @@ class Checker {
         0, frames, [&](int i) { checks[static_cast<std::size_t>(i)] = check_labels(sources, i); });
     std::vector<std::pair<LabelProblem, int>> kinds;  // the first of each kind, and how many follow
     for (int i = 0; i < frames; ++i) {
-      for (const auto& file : files_of_frame(layout_, info, i)) note_missing(file);
+      for (const auto& file : files_of_frame(layout_, info, i))
+        if (file != layout_.png_frame(i)) note_missing(file);
       const LabelCheck& found = checks[static_cast<std::size_t>(i)];
       result_.worst_flow_px = std::max(result_.worst_flow_px, found.worst_flow_px);
       result_.flow_samples += found.flow_samples;

@@ -3,6 +3,7 @@
 #include "render/scene_truth.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "core/files.h"
 #include "render/simulate.h"
@@ -15,7 +16,7 @@ namespace fs = std::filesystem;
 class SceneTruth : public testing::Test {
  protected:
   void SetUp() override {
-    root_ = fs::path(testing::TempDir()) / "rugae_scene_truth";
+    root_ = fs::path(testing::TempDir()) / ("rugae_scene_truth_" + std::to_string(static_cast<long>(getpid())));
     fs::remove_all(root_);
     make_folder(root_);
     write_scene("{uniform: [0.3, 0.8]}");

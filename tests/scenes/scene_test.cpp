@@ -118,10 +118,12 @@ TEST_F(SceneFiles, ThePresetIsAStomach) {
   expect_whole(scene);
   EXPECT_EQ(scene.name, "stomach");
   EXPECT_EQ(scene.rest_positions, scene.wall.vertices);
-  EXPECT_EQ(preset_names("scenes"), (std::vector<std::string>{"stomach", "stomach-moving"}));
-  EXPECT_EQ(
-      error_of("stomch"),
-      "scene 'stomch': no such preset; did you mean 'stomach'?; known: stomach, stomach-moving");
+  EXPECT_EQ(preset_names("scenes"),
+            (std::vector<std::string>{"stomach", "stomach-lesions", "stomach-moving",
+                                      "stomach-unclean"}));
+  EXPECT_EQ(error_of("stomch"),
+            "scene 'stomch': no such preset; did you mean 'stomach'?; known: stomach, "
+            "stomach-lesions, stomach-moving, stomach-unclean");
   EXPECT_EQ(error_of("stomach", "medum"),
             "resolution is 'medum', expected one of: coarse, medium, fine; did you mean 'medium'?");
 }
