@@ -5,9 +5,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/check.h"
+#include "dataset/colours.h"
 #include "dataset/image_io.h"
 #include "dataset/layout.h"
-#include "dataset/colours.h"
 #include "studies/html.h"
 #include "studies/report_parts.h"
 

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "core/check.h"
-#include "render/shaded_view.h"
 #include "dataset/colours.h"
+#include "render/shaded_view.h"
 #include "studies/html.h"
 #include "studies/plots.h"
 #include "studies/report_parts.h"

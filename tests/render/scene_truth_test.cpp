@@ -16,7 +16,8 @@ namespace fs = std::filesystem;
 class SceneTruth : public testing::Test {
  protected:
   void SetUp() override {
-    root_ = fs::path(testing::TempDir()) / ("rugae_scene_truth_" + std::to_string(static_cast<long>(getpid())));
+    root_ = fs::path(testing::TempDir()) /
+            ("rugae_scene_truth_" + std::to_string(static_cast<long>(getpid())));
     fs::remove_all(root_);
     make_folder(root_);
     write_scene("{uniform: [0.3, 0.8]}");
