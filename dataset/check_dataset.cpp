@@ -111,8 +111,7 @@ class Checker {
         0, frames, [&](int i) { checks[static_cast<std::size_t>(i)] = check_labels(sources, i); });
     std::vector<std::pair<LabelProblem, int>> kinds;  // the first of each kind, and how many follow
     for (int i = 0; i < frames; ++i) {
-      for (const auto& file : files_of_frame(layout_, info, i))
-        if (file != layout_.png_frame(i)) note_missing(file);
+      for (const auto& file : files_of_frame(layout_, info, i)) note_missing(file);
       const LabelCheck& found = checks[static_cast<std::size_t>(i)];
       result_.worst_flow_px = std::max(result_.worst_flow_px, found.worst_flow_px);
       result_.flow_samples += found.flow_samples;

@@ -29,12 +29,41 @@ json names_of(const TruthFiles& truth) {
   return names;
 }
 
-// Datasets from before there were such files do not name them.
-TruthFiles read_names(const json& object) {
-  const auto names = object.value("truth", json::array()).get<std::vector<std::string>>();
-  const auto has = [&](const char* name) { return std::ranges::find(names, name) != names.end(); };
-  return {has("backward_flow"), has("triangles"), has("row_poses"),
-          has("wall_motion"),   has("tracks"),    has("coverage")};
+json names_of(const ImageFiles& images) {
+  json names = json::array();
+  names.push_back(images.jpeg ? "jpeg" : "png");
+  if (images.adc) names.push_back("adc");
+  if (images.mosaic) names.push_back("mosaic");
+  if (images.radiance) names.push_back("radiance");
+  if (images.clean) names.push_back("clean");
+  return names;
+}
+
+// What a list in dataset.json names; datasets from before there was the list have none of it.
+class Names {
+ public:
+  Names(const json& object, const char* key)
+      : names_(object.value(key, json::array()).get<std::vector<std::string>>()) {}
+  bool has(const char* name) const { return std::ranges::find(names_, name) != names_.end(); }
+
+ private:
+  std::vector<std::string> names_;
+};
+
+TruthFiles truth_named(const Names& names) {
+  return {names.has("backward_flow"), names.has("triangles"), names.has("row_poses"),
+          names.has("wall_motion"),   names.has("tracks"),    names.has("coverage")};
+}
+
+// The quality of JPEG stands among the options: no reader needs it.
+ImageFiles images_named(const Names& names) {
+  ImageFiles images;
+  images.jpeg = names.has("jpeg");
+  images.adc = names.has("adc");
+  images.mosaic = names.has("mosaic");
+  images.radiance = names.has("radiance");
+  images.clean = names.has("clean");
+  return images;
 }
 
 json as_json(const DatasetInfo& info) {
@@ -51,6 +80,7 @@ json as_json(const DatasetInfo& info) {
           {"seed", info.seed},
           {"frames", info.frames},
           {"labels", info.labels},
+          {"images", names_of(info.images)},
           {"truth", names_of(info.truth)},
           {"options", options},
           {"units", {{"length", "mm"}, {"time", "s"}, {"flow", "px"}}},
@@ -124,7 +154,8 @@ DatasetInfo read_info(const fs::path& file) {
     object.at("seed").get_to(info.seed);
     object.at("frames").get_to(info.frames);
     object.at("labels").get_to(info.labels);
-    info.truth = read_names(object);
+    info.images = images_named({object, "images"});
+    info.truth = truth_named({object, "truth"});
     info.text = object.at("options").dump();
   } catch (const json::exception& error) {
     fail("{}: not the description of a dataset: {}", file.string(), error.what());

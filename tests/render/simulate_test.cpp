@@ -19,6 +19,7 @@
 #include "dataset/layout.h"
 #include "dataset/observations.h"
 #include "dataset/truth.h"
+#include "dataset/writer.h"
 #include "render/isp.h"
 #include "tests/render/walls.h"
 
@@ -328,6 +329,8 @@ TEST_F(Simulate, EveryOutputReadsBack) {
   const Observations seen = Observations::open(root_ / "a");
   EXPECT_EQ(seen.file(1).filename(), "000001.jpg");
   EXPECT_FALSE(fs::exists(a.png_frame(1)));
+  const ImageFiles named = read_info(a.info()).images;
+  EXPECT_TRUE(named.jpeg && named.adc && named.mosaic && named.radiance && named.clean);
   // JPEG at quality 70 keeps this noisy frame to a few values in 255
   const cv::Mat frame = read_image_bgr(png.frame(1));
   EXPECT_LT(cv::norm(seen.image(1), frame, cv::NORM_L1) / (3.0 * frame.total()), 8.0);
