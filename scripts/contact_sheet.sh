@@ -27,7 +27,7 @@ frame "no interreflection" 350 --set light.bounces=0
 frame "two bounces" 350 --set light.bounces=2 light.samples=64
 frame "mucus, bubbles, debris" 200 --scene stomach-unclean
 frame "lesions" 200 --scene stomach-lesions
-for time in 0 5 10 15; do frame "peristalsis, $time s" $((30 * time)) --scene stomach-moving --trajectory scripts/contact_sheet/antrum.txt; done
+for index in 180 360 540; do frame "moving wall, $((index / 30)) s" "$index" --scene stomach-moving --trajectory 2; done
 
 frame "all labels" 200 --scene stomach-lesions --set truth.backward_flow=true truth.triangles=true
 build/release/apps/rugae picture "$out/data" --frame 200 --labels --out "$out/labels.png"
