@@ -4,28 +4,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <opencv2/core.hpp>
 
 #include "core/check.h"
 #include "core/units.h"
+#include "dataset/contest.h"
 #include "dataset/pose_mistakes.h"
+#include "dataset/turn_search.h"
 #include "dataset/warp_pairs.h"
 
 namespace rugae {
 namespace {
 
-// An explanation has to leave at most this share of the disagreement: right ones leave a tenth or
-// less of it, wrong ones seldom less than a half.
-constexpr double kClear = 0.35;
-// Explanations within this factor of the best are alike; the first of them is meant.
-constexpr double kAlike = 1.3;
 // Disagreements below these are those of sound files: of interpolated depth, of float flow.
 constexpr double kSoundShare = 5e-4, kSoundFlow_px = 2e-3;
 // What an explanation may leave: measured depth has a few per cent of noise.
 constexpr double kExplainedShare = 0.03;
-constexpr double kFewSamples = 60;
 
 // A way to read the sequence: which depth, which pose, which flow stand for a frame.
 struct Reading {
@@ -42,34 +37,6 @@ std::vector<Reading> pose_readings() {
   readings.back().kind = DepthKind::range;
   return readings;
 }
-
-// Medians of a few readings over the same pairs; the first reading is the files as given.
-struct Contest {
-  std::vector<double> medians;
-  std::vector<std::size_t> counts;
-
-  explicit Contest(const std::vector<std::vector<double>>& errors) {
-    for (const auto& e : errors) {
-      medians.push_back(median_of(e));
-      counts.push_back(e.size());
-    }
-  }
-  // The first reading, other than as given, that is as good as the best of those with enough
-  // samples; 0 when none is clearly better than as given.
-  std::size_t winner(double sound, double most) const {
-    double best = std::numeric_limits<double>::infinity();
-    const auto counted = [&](std::size_t i) {
-      return counts[i] >= kFewSamples && 4 * counts[i] >= counts[0];
-    };
-    for (std::size_t i = 1; i < medians.size(); ++i)
-      if (counted(i)) best = std::min(best, medians[i]);
-    if (!(medians[0] > sound) || !(best <= kClear * medians[0]) || !(best <= most)) return 0;
-    for (std::size_t i = 1; i < medians.size(); ++i)
-      if (counted(i) && medians[i] <= std::max(kAlike * best, sound)) return i;
-    return 0;
-  }
-  double margin(std::size_t winner) const { return medians[0] / std::max(medians[winner], 1e-12); }
-};
 
 class Diagnoser {
  public:
@@ -123,9 +90,9 @@ class Diagnoser {
       const Contest contest = depth_contest(pairs, readings);
       // frames too far apart to see the same wall tell nothing
       constexpr double kOverlap = 0.4;
-      if (gap == 1 &&
-          static_cast<double>(contest.counts[0]) >=
-              std::max(kFewSamples, kOverlap * static_cast<double>(pairs.size() * grid_.patches())))
+      if (gap == 1 && static_cast<double>(contest.counts[0]) >=
+                          std::max(Contest::kFewSamples,
+                                   kOverlap * static_cast<double>(pairs.size() * grid_.patches())))
         result_.depth_share = contest.medians[0];
       const std::size_t winner = contest.winner(kSoundShare, kExplainedShare);
       if (winner == 0 || contest.margin(winner) <= margin) continue;
@@ -210,7 +177,7 @@ class Diagnoser {
       const auto errors_of = [&](const Turns& turns) {
         return grid_.depth_shares(
             depths[i].first, depths[i].second,
-            Rigid3(rotation(turns.head<3>()), rotation(turns.tail<3>()) * moved.translation));
+            Rigid3(rotation_of(turns.head<3>()), rotation_of(turns.tail<3>()) * moved.translation));
       };
       const Turns best = best_turns(errors_of);
       given[i] = errors_of(Turns::Zero());
@@ -231,53 +198,6 @@ class Diagnoser {
           names_.poses, median_of(turns_deg), percent(contest.medians[0]),
           percent(contest.medians[1])));
     return frozen_;
-  }
-
-  // Rotation vectors, rad: of the camera, and of its step.
-  using Turns = Eigen::Matrix<double, 6, 1>;
-
-  static Quat rotation(const Vec3& turn_rad) {
-    const double angle = turn_rad.norm();
-    return Quat(
-        Eigen::AngleAxisd(angle, angle > 0.0 ? Vec3(turn_rad / angle) : Vec3(Vec3::UnitX())));
-  }
-
-  // Pattern search from no turn of the camera and from seven directions of its step.
-  template <typename ErrorsOf>
-  static Turns best_turns(const ErrorsOf& errors_of) {
-    // the mean of errors that are cut off falls more smoothly than their median
-    const auto error_of = [&](const Turns& turns) {
-      const std::vector<double> errors = errors_of(turns);
-      constexpr double kCut = 0.1, kFew = 40.0;
-      double sum = kCut * std::max(0.0, kFew - static_cast<double>(errors.size()));
-      for (const double e : errors) sum += std::min(e, kCut);
-      return sum / std::max(kFew, static_cast<double>(errors.size()));
-    };
-    Turns best = Turns::Zero();
-    double least = error_of(best);
-    for (int start = 0; start < 7; ++start) {
-      Turns turns = Turns::Zero();
-      if (start > 0) turns[3 + (start - 1) / 2] = start % 2 == 0 ? -0.5 * kPi : 0.5 * kPi;
-      double error = error_of(turns);
-      for (double step_rad = rad_from_deg(16.0); step_rad > rad_from_deg(1.0 / 16.0);) {
-        bool better = false;
-        for (int k = 0; k < 12; ++k) {
-          Turns next = turns;
-          next[k / 2] += k % 2 == 0 ? step_rad : -step_rad;
-          if (const double e = error_of(next); e < error) {
-            error = e;
-            turns = next;
-            better = true;
-          }
-        }
-        if (!better) step_rad *= 0.5;
-      }
-      if (error < least) {
-        least = error;
-        best = turns;
-      }
-    }
-    return best;
   }
 
   // A unit nobody thought of: the factor of the poses' lengths for which depth agrees best.
@@ -356,7 +276,7 @@ class Diagnoser {
       }
     }
     const Contest contest(errors);
-    if (contest.counts[0] < kFewSamples) return;
+    if (contest.counts[0] < Contest::kFewSamples) return;
     result_.flow_px = contest.medians[0];
     if (frozen_) return;
     const std::size_t winner = contest.winner(kSoundFlow_px, 1.0);
