@@ -39,7 +39,7 @@ std::vector<PoseMistake> all_mistakes() {
       {"their x and y axes are flipped", {-1, -1, 1}},
       {"their translations are negated", {-1, -1, -1}}};
   for (const auto& [text, signs] : kAxes)
-    mistakes.push_back({text, [signs](const Rigid3& p) { return mirrored(p, signs); }});
+    mistakes.push_back({text, [signs = signs](const Rigid3& p) { return mirrored(p, signs); }});
   for (int axis = 0; axis < 3; ++axis) {
     Vec3 signs = Vec3::Ones();
     signs[axis] = -1.0;
