@@ -42,7 +42,7 @@ void add_simulate(CLI::App& app) {
     SimulateOptions options;
     fs::path out, settings;
     std::vector<std::string> changes;
-    bool json = false, clean = false, no_labels = false;
+    bool json = false, clean = false, no_labels = false, all_labels = false;
   };
   const auto a = std::make_shared<Arguments>();
   CLI::App& command = *app.add_subcommand(
@@ -66,7 +66,8 @@ void add_simulate(CLI::App& app) {
   command.add_option("--options", a->settings, "YAML with the settings of light, lens and sensor");
   command.add_option("--set", a->changes, "One setting by its path, such as sensor.noise=false");
   command.add_flag("--clean", a->clean, "No sensor noise");
-  command.add_flag("--no-labels", a->no_labels, "Frames and poses only");
+  auto* none = command.add_flag("--no-labels", a->no_labels, "Frames and poses only");
+  command.add_flag("--all-labels", a->all_labels, "Every label image there is")->excludes(none);
   command.add_option("--out", a->out, "The dataset's folder")->required();
   add_json_flag(command, a->json);
   command.callback([a] {
@@ -75,6 +76,10 @@ void add_simulate(CLI::App& app) {
     for (const std::string& change : a->changes) change_setting(change, render);
     if (a->clean) render.sensor.noise = false;
     if (a->no_labels) render.labels = false;
+    if (a->all_labels) {
+      render.truth.labels = LabelSet::all();
+      render.truth.labels.indirect = render.light.bounces > 0;
+    }
     Progress progress;
     const SimulateResult r = simulate(a->options, a->out, progress);
     const int frames = r.frames + r.skipped;

@@ -3,11 +3,13 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "core/check.h"
 #include "core/files.h"
 #include "dataset/check_labels.h"
+#include "dataset/check_surface_labels.h"
 #include "dataset/diagnose.h"
 #include "dataset/frame_list.h"
 #include "dataset/image_io.h"
@@ -19,6 +21,13 @@
 namespace rugae {
 namespace fs = std::filesystem;
 namespace {
+
+// One ray a pixel, through its centre.
+bool is_sharp(const DatasetInfo& info) {
+  const auto options = nlohmann::json::parse(info.text, nullptr, false);
+  const auto lens = options.is_object() ? options.find("lens") : options.end();
+  return lens == options.end() || !lens->is_object() || lens->value("samples", 1) == 1;
+}
 
 class Checker {
  public:
@@ -39,11 +48,12 @@ class Checker {
     if (track) check_track(*track, info.frames);
     if (track) check_times(*track, info.frames);
     if (camera) check_frames(camera->lens, info.frames);
-    const bool labelled =
-        camera && track && wall && info.labels && static_cast<int>(track->size()) == info.frames;
-    if (labelled) check_all_labels({layout_, camera->lens, *track, &*camera, &*wall}, info);
+    const bool labelled = camera && track && wall && static_cast<int>(track->size()) == info.frames;
+    if (labelled)
+      check_all_labels({layout_, camera->lens, *track, &*camera, &*wall, is_sharp(info)}, info);
     // Colour is led from frame to frame by one pose a frame and a wall that keeps still.
-    if (labelled && problems_.none() && !info.truth.row_poses && !info.truth.wall_motion)
+    if (labelled && info.truth.labels.depth && problems_.none() && !info.truth.row_poses &&
+        !info.truth.wall_motion)
       check_colour(camera->lens, *track);
     result_.problems = problems_.take();
     return std::move(result_);
@@ -107,8 +117,14 @@ class Checker {
   void check_all_labels(const LabelSources& sources, const DatasetInfo& info) {
     const int frames = info.frames;
     std::vector<LabelCheck> checks(static_cast<std::size_t>(frames));
-    tbb::parallel_for(
-        0, frames, [&](int i) { checks[static_cast<std::size_t>(i)] = check_labels(sources, i); });
+    const auto named = problems_.attempt([&] { return read_named_numbers(layout_); });
+    tbb::parallel_for(0, frames, [&](int i) {
+      LabelCheck& found = checks[static_cast<std::size_t>(i)];
+      found = check_labels(sources, i);
+      if (!named) return;
+      const auto more = check_surface_labels(sources, *named, i);
+      found.problems.insert(found.problems.end(), more.begin(), more.end());
+    });
     std::vector<std::pair<LabelProblem, int>> kinds;  // the first of each kind, and how many follow
     for (int i = 0; i < frames; ++i) {
       for (const auto& file : files_of_frame(layout_, info, i)) note_missing(file);

@@ -27,6 +27,7 @@ struct LabelSources {
   const PoseTrack& track;
   const Camera* camera = nullptr;      // with a rolling shutter: its
   const TriangleMesh* wall = nullptr;  // where it moves: at rest
+  bool sharp = true;  // the colours are those of one ray a pixel, as the labels are
 };
 
 /// Reads the labels of the frame and compares them; a label that is missing or cannot be read is a

@@ -125,6 +125,22 @@ cv::Mat mask_picture(const cv::Mat& bgr, const cv::Mat& masks) {
   return picture;
 }
 
+// Hues a golden angle apart: successive numbers look least alike.
+cv::Mat number_picture(const cv::Mat& numbers) {
+  cv::Mat picture(numbers.size(), CV_8UC3, cv::Scalar(kNothing[0], kNothing[1], kNothing[2]));
+  const int channels = numbers.channels();
+  for (int y = 0; y < numbers.rows; ++y)
+    for (int x = 0; x < numbers.cols; ++x) {
+      const float number = numbers.depth() == CV_8U ? numbers.ptr<unsigned char>(y)[x * channels]
+                                                    : numbers.ptr<float>(y)[x * channels];
+      if (!(number > 0.0f)) continue;
+      constexpr double kGoldenTurn = 0.6180339887498949;
+      const double angle = 2.0 * kPi * std::fmod(kGoldenTurn * number, 1.0);
+      picture.at<cv::Vec3b>(y, x) = flow_colour(std::cos(angle), std::sin(angle), 1.2);
+    }
+  return picture;
+}
+
 std::string mask_key_html() {
   std::string out;
   for (const MaskColour& colour : kMaskColours)

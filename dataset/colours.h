@@ -24,6 +24,10 @@ cv::Mat flow_wheel(int side_px);
 cv::Mat mask_picture(const cv::Mat& bgr, const cv::Mat& masks);
 std::string mask_key_html();
 
+/// Numbers told apart: each its own colour, 0 and NaN dark gray. CV_8U, or the first channel of
+/// float. CV_8UC3, BGR.
+cv::Mat number_picture(const cv::Mat& numbers);
+
 /// Error colours from teal (none) over cream to dark red (`t` = 1); sRGB in [0, 1].
 Vec3f error_colour(double t);
 /// The same colours as a CSS gradient, from left to right.

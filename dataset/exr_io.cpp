@@ -31,15 +31,19 @@ std::vector<std::string> channel_names(int channels) {
   return {"x", "y", "z"};
 }
 
-OIIO::ImageSpec spec_of(const cv::Mat& image, const std::vector<std::string>& names) {
-  OIIO::ImageSpec spec(image.cols, image.rows, image.channels(), OIIO::TypeDesc::FLOAT);
+const std::vector<std::string> kRgb = {"R", "G", "B"};
+
+OIIO::ImageSpec spec_of(const cv::Mat& image, const std::vector<std::string>& names,
+                        OIIO::TypeDesc type) {
+  OIIO::ImageSpec spec(image.cols, image.rows, image.channels(), type);
   spec.channelnames = names;
   spec.attribute("compression", kCompression);
   spec.attribute("DateTime", "1970:01:01 00:00:00");  // otherwise the time of writing
   return spec;
 }
 
-void write(const fs::path& file, const cv::Mat& image, const std::vector<std::string>& names) {
+void write(const fs::path& file, const cv::Mat& image, const std::vector<std::string>& names,
+           OIIO::TypeDesc stored = OIIO::TypeDesc::FLOAT) {
   check(file.extension() == ".exr", "{}: expected the extension .exr", file.string());
   check(!image.empty() && image.depth() == CV_32F && image.channels() <= 3,
         "{}: image of type {}, expected float32 of 1 to 3 channels", file.string(),
@@ -51,7 +55,7 @@ void write(const fs::path& file, const cv::Mat& image, const std::vector<std::st
   OIIO::Filesystem::IOVecOutput memory(bytes);
   const auto out = OIIO::ImageOutput::create("memory.exr", &memory);
   check(out != nullptr, "{}: cannot be encoded: {}", file.string(), OIIO::geterror());
-  const bool written = out->open("memory.exr", spec_of(image, names)) &&
+  const bool written = out->open("memory.exr", spec_of(image, names, stored)) &&
                        out->write_image(OIIO::TypeDesc::FLOAT, image.data,
                                         static_cast<OIIO::stride_t>(image.elemSize()),
                                         static_cast<OIIO::stride_t>(image.step[0])) &&
@@ -91,7 +95,19 @@ void write_exr(const fs::path& file, const cv::Mat& image) {
 
 void write_radiance(const fs::path& file, const cv::Mat& rgb) {
   check(rgb.type() == CV_32FC3, "{}: radiance must be CV_32FC3", file.string());
-  write(file, rgb, {"R", "G", "B"});
+  write(file, rgb, kRgb);
+}
+
+void write_half_rgb(const fs::path& file, const cv::Mat& rgb) {
+  check(rgb.type() == CV_32FC3, "{}: a colour must be CV_32FC3", file.string());
+  write(file, rgb, kRgb, OIIO::TypeDesc::HALF);
+}
+
+cv::Mat read_rgb_exr(const fs::path& file) {
+  return read_checked(file, [&file](const OIIO::ImageSpec& spec) {
+    check(spec.channelnames == kRgb, "{}: channels {}, expected R G B", file.string(),
+          fmt::join(spec.channelnames, " "));
+  });
 }
 
 cv::Mat read_exr(const fs::path& file) {

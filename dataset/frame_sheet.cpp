@@ -7,6 +7,8 @@
 #include "core/check.h"
 #include "dataset/colours.h"
 #include "dataset/image_io.h"
+#include "dataset/label_images.h"
+#include "dataset/writer.h"
 
 namespace rugae {
 namespace {
@@ -28,23 +30,48 @@ cv::Mat flow_tile(const cv::Mat& flow_px) {
   return flow_picture(flow_px, std::max(1.0, quantile(length, kUpTo)));
 }
 
+// Light as an image of its own: the brightest 1 % may clip.
+cv::Mat light_tile(const cv::Mat& light) {
+  cv::Mat bgr;
+  if (light.channels() == 1)
+    cv::cvtColor(light, bgr, cv::COLOR_GRAY2BGR);
+  else
+    cv::cvtColor(light, bgr, cv::COLOR_RGB2BGR);
+  const double top = std::max(1e-9, quantile(bgr.reshape(1), 0.99));
+  bgr = cv::max(bgr, 0.0) / top;
+  cv::pow(cv::min(bgr, 1.0), 1.0 / 2.2, bgr);
+  bgr.convertTo(bgr, CV_8UC3, 255.0);
+  return bgr;
+}
+
+cv::Mat label_tile(const LabelImage& label, const cv::Mat& image, const cv::Mat& bgr) {
+  const auto is = [&label](bool LabelSet::*member) { return label.wanted == member; };
+  if (is(&LabelSet::depth) || is(&LabelSet::range)) return depth_tile(image);
+  if (is(&LabelSet::flow) || is(&LabelSet::backward_flow)) return flow_tile(image);
+  if (is(&LabelSet::masks)) return mask_picture(bgr, image);
+  if (is(&LabelSet::triangles) || label.type == CV_8UC1) return number_picture(image);
+  if (label.coding == LabelCoding::normals) return normal_picture(image);
+  return light_tile(image);
+}
+
 }  // namespace
 
 std::vector<SheetTile> label_tiles(const std::filesystem::path& dataset, int frame) {
-  const Truth truth = Truth::open(dataset);
-  check(frame >= 0 && frame < truth.size(), "{}: frame {}, expected 0 to {}", dataset.string(),
-        frame, truth.size() - 1);
+  // A dataset of which one frame was made is good enough.
   const DatasetLayout layout{dataset};
+  const int frames = read_info(layout.info()).frames;
+  check(frame >= 0 && frame < frames, "{}: frame {}, expected 0 to {}", dataset.string(), frame,
+        frames - 1);
   const cv::Mat bgr = read_image_bgr(layout.frame(frame));
   std::vector<SheetTile> tiles;
-  const auto add = [&](const char* caption, const std::filesystem::path& file, auto picture) {
-    if (std::filesystem::exists(file)) tiles.push_back({caption, picture()});
-  };
-  add("depth", layout.depth(frame), [&] { return depth_tile(truth.depth_mm(frame)); });
-  add("normals", layout.normals(frame), [&] { return normal_picture(truth.normal(frame)); });
-  add("flow to the next frame", layout.flow(frame),
-      [&] { return flow_tile(truth.flow_px(frame)); });
-  add("masks", layout.masks(frame), [&] { return mask_picture(bgr, truth.masks(frame)); });
+  for (const LabelImage& label : label_images()) {
+    const std::filesystem::path file = label.file(layout, frame);
+    if (!std::filesystem::exists(file)) continue;
+    const cv::Mat image = label.read(file);
+    check(image.type() == label.type && image.size() == bgr.size(), "{}: not of the frame's size",
+          file.string());
+    tiles.push_back({label.name, label_tile(label, image, bgr)});
+  }
   return tiles;
 }
 

@@ -26,8 +26,12 @@ bool has_image_extension(const std::filesystem::path& file);
 /// Float32 EXR of 1, 2 or 3 channels (Y; x y; x y z), lossless. No time stamps: the same pixels
 /// give the same bytes.
 void write_exr(const std::filesystem::path& file, const cv::Mat& image);
-/// Float32 EXR with channels R G B, from CV_32FC3 in RGB; read_any_exr reads it.
+/// Float32 EXR with channels R G B, from CV_32FC3 in RGB.
 void write_radiance(const std::filesystem::path& file, const cv::Mat& rgb);
+/// The same in float16: 11 bits, for values that need no more.
+void write_half_rgb(const std::filesystem::path& file, const cv::Mat& rgb);
+/// CV_32FC3, RGB, from a file that either of the two wrote. Throws Error as above.
+cv::Mat read_rgb_exr(const std::filesystem::path& file);
 /// CV_32F of as many channels as the file has. Throws Error as above.
 cv::Mat read_exr(const std::filesystem::path& file);
 /// Any OpenEXR file that others wrote: CV_32F of its first channels (four at most), whatever their

@@ -26,8 +26,12 @@
 //                               and where asked for, or where there is something to say:
 //       backward_flow/000001.exr  as flow, from frame t to t-1 (absent for the first frame)
 //       triangles/000000.exr    channels x y z: triangle of the wall, barycentric coordinates of
-//       its
-//                               second and third corner
+//                               its second and third corner
+//       range/ shading_normals/ albedo/ diffuse/ specular/ indirect/ regions/ instances/
+//                               one image a frame each, see dataset/label_images.h
+//       scene.yaml              the scene with every default and draw filled in
+//       regions.csv             region,name
+//       instances.csv           lesions and objects on the wall
 //       row_poses/000000.txt    rolling shutter: TUM, poses of rows -1 to height
 //       wall_motion/000000.ply  moving wall: what to add to the vertices of wall.ply
 //       track_points.csv        point,triangle,b1,b2
@@ -75,11 +79,13 @@ struct DatasetLayout {
   std::filesystem::path masks(int index) const;
   std::filesystem::path radiance(int index) const;
   std::filesystem::path clean(int index) const;
-  // Where the dataset has them:
+  // Where the dataset has them (further label images: dataset/label_images.h):
   std::filesystem::path backward_flow(int index) const;
   std::filesystem::path triangles(int index) const;
   std::filesystem::path row_poses(int index) const;
   std::filesystem::path wall_motion(int index) const;
+  std::filesystem::path regions() const { return truth() / "regions.csv"; }
+  std::filesystem::path instances() const { return truth() / "instances.csv"; }
   std::filesystem::path track_points() const { return truth() / "track_points.csv"; }
   std::filesystem::path tracks(int index) const;
   std::filesystem::path coverage() const { return truth() / "coverage.csv"; }

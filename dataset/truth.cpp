@@ -1,21 +1,10 @@
 #include "dataset/truth.h"
 
 #include "core/check.h"
-#include "dataset/image_io.h"
+#include "dataset/label_images.h"
 #include "dataset/ply_io.h"
 
 namespace rugae {
-namespace {
-
-cv::Mat of_size(cv::Mat image, int type, const Lens& lens, const std::filesystem::path& file) {
-  check(image.cols == lens.width && image.rows == lens.height && image.type() == type,
-        "{}: {} x {} px of {}, expected {} x {} of {}", file.string(), image.cols, image.rows,
-        cv::typeToString(image.type()), lens.width, lens.height, cv::typeToString(type));
-  return image;
-}
-
-}  // namespace
-
 RowPoses read_row_poses(const std::filesystem::path& file, const Camera& camera) {
   const PoseTrack track = read_tum(file);
   check(static_cast<int>(track.size()) == camera.lens.height + 2 &&
@@ -55,18 +44,18 @@ Truth Truth::open(const std::filesystem::path& dataset) {
   return truth;
 }
 
-cv::Mat Truth::depth_mm(int index) const {
-  const auto file = layout_.depth(index);
-  return of_size(read_exr(file), CV_32FC1, camera_.lens, file);
+cv::Mat Truth::label(const std::string& name, int index) const {
+  const LabelImage& label = label_image(name);
+  const auto file = label.file(layout_, index);
+  const cv::Mat image = label.read(file);
+  check(image.cols == camera_.lens.width && image.rows == camera_.lens.height &&
+            image.type() == label.type,
+        "{}: {} x {} px of {}, expected {} x {} of {}", file.string(), image.cols, image.rows,
+        cv::typeToString(image.type()), camera_.lens.width, camera_.lens.height,
+        cv::typeToString(label.type));
+  return image;
 }
-cv::Mat Truth::normal(int index) const {
-  const auto file = layout_.normals(index);
-  return of_size(read_normals(file), CV_32FC3, camera_.lens, file);
-}
-cv::Mat Truth::flow_px(int index) const {
-  const auto file = layout_.flow(index);
-  return of_size(read_exr(file), CV_32FC2, camera_.lens, file);
-}
+
 TriangleMesh Truth::wall(int index) const {
   const auto file = layout_.wall_motion(index);
   if (!std::filesystem::exists(file)) return wall_;
@@ -77,19 +66,6 @@ RowPoses Truth::row_poses(int index) const {
   const auto file = layout_.row_poses(index);
   if (std::filesystem::exists(file)) return read_row_poses(file, camera_);
   return RowPoses(track_[static_cast<std::size_t>(index)].world_from_camera);
-}
-
-cv::Mat Truth::backward_flow_px(int index) const {
-  const auto file = layout_.backward_flow(index);
-  return of_size(read_exr(file), CV_32FC2, camera_.lens, file);
-}
-cv::Mat Truth::triangle(int index) const {
-  const auto file = layout_.triangles(index);
-  return of_size(read_exr(file), CV_32FC3, camera_.lens, file);
-}
-cv::Mat Truth::masks(int index) const {
-  const auto file = layout_.masks(index);
-  return of_size(read_image_as_stored(file), CV_8UC1, camera_.lens, file);
 }
 
 }  // namespace rugae

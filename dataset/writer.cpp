@@ -16,12 +16,12 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 namespace {
 
-constexpr int kLayoutVersion = 1;  // raised when readers of the layout must change
+constexpr int kLayoutVersion = 2;  // raised when readers of the layout must change
 
 json names_of(const TruthFiles& truth) {
   json names = json::array();
-  if (truth.backward_flow) names.push_back("backward_flow");
-  if (truth.triangles) names.push_back("triangles");
+  for (const LabelImage& label : label_images())
+    if (truth.labels.*label.wanted) names.push_back(label.name);
   if (truth.row_poses) names.push_back("row_poses");
   if (truth.wall_motion) names.push_back("wall_motion");
   if (truth.tracks) names.push_back("tracks");
@@ -39,11 +39,11 @@ json names_of(const ImageFiles& images) {
   return names;
 }
 
-// What a list in dataset.json names; datasets from before there was the list have none of it.
+// What a list in dataset.json names.
 class Names {
  public:
   Names(const json& object, const char* key)
-      : names_(object.value(key, json::array()).get<std::vector<std::string>>()) {}
+      : names_(object.at(key).get<std::vector<std::string>>()) {}
   bool has(const char* name) const { return std::ranges::find(names_, name) != names_.end(); }
 
  private:
@@ -51,8 +51,13 @@ class Names {
 };
 
 TruthFiles truth_named(const Names& names) {
-  return {names.has("backward_flow"), names.has("triangles"), names.has("row_poses"),
-          names.has("wall_motion"),   names.has("tracks"),    names.has("coverage")};
+  TruthFiles truth{.labels = {},
+                   .row_poses = names.has("row_poses"),
+                   .wall_motion = names.has("wall_motion"),
+                   .tracks = names.has("tracks"),
+                   .coverage = names.has("coverage")};
+  for (const LabelImage& label : label_images()) truth.labels.*label.wanted = names.has(label.name);
+  return truth;
 }
 
 // The quality of JPEG stands among the options: no reader needs it.
@@ -79,7 +84,6 @@ json as_json(const DatasetInfo& info) {
           {"resolution", info.resolution},
           {"seed", info.seed},
           {"frames", info.frames},
-          {"labels", info.labels},
           {"images", names_of(info.images)},
           {"truth", names_of(info.truth)},
           {"options", options},
@@ -129,13 +133,6 @@ bool same_mesh(const TriangleMesh& a, const TriangleMesh& b) {
   return a.vertices == b.vertices && a.triangles == b.triangles;
 }
 
-void check_label(const cv::Mat& label, int type, const cv::Mat& frame, const char* name,
-                 int index) {
-  check(label.type() == type && label.size() == frame.size(),
-        "frame {}: {} is {} x {} of {}, expected {} x {} of {}", index, name, label.cols,
-        label.rows, cv::typeToString(label.type()), frame.cols, frame.rows, cv::typeToString(type));
-}
-
 }  // namespace
 
 std::string info_json(const DatasetInfo& info) { return as_json(info).dump(2) + "\n"; }
@@ -153,7 +150,6 @@ DatasetInfo read_info(const fs::path& file) {
     object.at("resolution").get_to(info.resolution);
     object.at("seed").get_to(info.seed);
     object.at("frames").get_to(info.frames);
-    object.at("labels").get_to(info.labels);
     info.images = images_named({object, "images"});
     info.truth = truth_named({object, "truth"});
     info.text = object.at("options").dump();
@@ -208,13 +204,10 @@ void DatasetWriter::write_scene(const Camera& camera, const PoseTrack& track,
 std::vector<fs::path> files_of_frame(const DatasetLayout& layout, const DatasetInfo& info,
                                      int index) {
   std::vector<fs::path> files;
-  if (info.labels) {
-    files = {layout.depth(index), layout.normals(index), layout.masks(index)};
-    if (index + 1 < info.frames) files.push_back(layout.flow(index));
-    if (info.truth.backward_flow && index > 0) files.push_back(layout.backward_flow(index));
-    if (info.truth.triangles) files.push_back(layout.triangles(index));
-    if (info.truth.tracks) files.push_back(layout.tracks(index));
-  }
+  for (const LabelImage& label : label_images())
+    if (info.truth.labels.*label.wanted && label.exists_for(index, info.frames))
+      files.push_back(label.file(layout, index));
+  if (info.truth.tracks) files.push_back(layout.tracks(index));
   if (info.truth.row_poses) files.push_back(layout.row_poses(index));
   if (info.truth.wall_motion) files.push_back(layout.wall_motion(index));
   const std::vector<fs::path> images = image_files(layout, info.images, index);
@@ -238,25 +231,16 @@ void DatasetWriter::write_frame(int index, const cv::Mat& bgr8, const FrameTruth
   check(bgr8.type() == CV_8UC3 && (width_ == 0 || (bgr8.cols == width_ && bgr8.rows == height_)),
         "frame {}: image is {} x {} of {}, expected {} x {} of CV_8UC3", index, bgr8.cols,
         bgr8.rows, cv::typeToString(bgr8.type()), width_, height_);
-  if (info_.labels) {
-    check_label(truth.depth_mm, CV_32FC1, bgr8, "depth", index);
-    check_label(truth.normal, CV_32FC3, bgr8, "normal", index);
-    check_label(truth.masks, CV_8UC1, bgr8, "masks", index);
-    if (has_flow(index)) check_label(truth.flow_px, CV_32FC2, bgr8, "flow", index);
-    write_exr(layout_.depth(index), truth.depth_mm);
-    write_normals(layout_.normals(index), truth.normal);
-    write_image(layout_.masks(index), truth.masks);
-    if (has_flow(index)) write_exr(layout_.flow(index), truth.flow_px);
-    if (info_.truth.backward_flow && index > 0) {
-      check_label(truth.backward_flow_px, CV_32FC2, bgr8, "backward flow", index);
-      write_exr(layout_.backward_flow(index), truth.backward_flow_px);
-    }
-    if (info_.truth.triangles) {
-      check_label(truth.triangle, CV_32FC3, bgr8, "triangle", index);
-      write_exr(layout_.triangles(index), truth.triangle);
-    }
-    if (info_.truth.tracks) write_atomic(layout_.tracks(index), tracks_text(truth.tracks));
+  for (const LabelImage& label : label_images()) {
+    if (!(info_.truth.labels.*label.wanted) || !label.exists_for(index, info_.frames)) continue;
+    const cv::Mat& image = truth.*label.image;
+    check(image.type() == label.type && image.size() == bgr8.size(),
+          "frame {}: {} is {} x {} of {}, expected {} x {} of {}", index, label.what, image.cols,
+          image.rows, cv::typeToString(image.type()), bgr8.cols, bgr8.rows,
+          cv::typeToString(label.type));
+    label.write(label.file(layout_, index), image);
   }
+  if (info_.truth.tracks) write_atomic(layout_.tracks(index), tracks_text(truth.tracks));
   if (info_.truth.row_poses) write_atomic(layout_.row_poses(index), tum_text(truth.row_poses));
   if (info_.truth.wall_motion) {
     TriangleMesh points;
@@ -279,7 +263,7 @@ void DatasetWriter::finish(const std::vector<double>& exposure_s,
     records.push_back({track_[i].time_s, exposure_s[i], gain[i]});
   }
   write_atomic(layout_.frame_list(), frame_list_text(records));
-  if (info_.labels && info_.truth.coverage) {
+  if (info_.truth.coverage) {
     std::vector<fs::path> triangles;
     for (int i = 0; i < info_.frames; ++i) triangles.push_back(layout_.triangles(i));
     write_atomic(layout_.coverage(), coverage_text(triangles));

@@ -11,17 +11,19 @@
 #include "core/mesh.h"
 #include "core/pose_track.h"
 #include "dataset/frame_images.h"
+#include "dataset/label_images.h"
 #include "dataset/layout.h"
 #include "dataset/truth.h"
 
 namespace rugae {
 
-/// Files of truth that not every dataset has.
+/// Files of truth that not every dataset has; `truth` in dataset.json names them.
 struct TruthFiles {
-  bool backward_flow = false, triangles = false;  // where there are labels
-  bool row_poses = false;                         // rolling shutter
-  bool wall_motion = false;                       // moving wall
-  bool tracks = false, coverage = false;          // where there are labels
+  LabelSet labels;
+  bool row_poses = false;    // rolling shutter
+  bool wall_motion = false;  // moving wall
+  bool tracks = false;
+  bool coverage = false;  // counted from the triangles
 };
 
 /// What made a dataset; two runs with the same info write the same bytes.
@@ -29,7 +31,6 @@ struct DatasetInfo {
   std::string scene, camera, trajectory, resolution;
   std::uint64_t seed = 1;
   int frames = 0;
-  bool labels = true;  // false: no truth images
   ImageFiles images;
   TruthFiles truth;
   std::string text;  // every option as a canonical JSON object: a folder begun with another text
@@ -61,7 +62,7 @@ class DatasetWriter {
   /// presence suffices).
   bool has_frame(int index) const;
   /// Safe to call from several threads for different frames. `bgr8` is the observation. The frame
-  /// image itself is published last. Without labels, `truth` is not looked at.
+  /// image itself is published last. Labels that the dataset has not are not looked at.
   void write_frame(int index, const cv::Mat& bgr8, const FrameTruth& truth,
                    const ExtraImages& extra = {}) const;
   /// frames.csv, then the manifest over every file. Only now is the dataset complete. Throws Error
@@ -71,8 +72,6 @@ class DatasetWriter {
   const DatasetLayout& layout() const { return layout_; }
 
  private:
-  bool has_flow(int index) const { return index + 1 < info_.frames; }
-
   DatasetLayout layout_;
   DatasetInfo info_;
   PoseTrack track_;

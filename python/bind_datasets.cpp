@@ -6,6 +6,7 @@
 #include "dataset/check_dataset.h"
 #include "dataset/estimate.h"
 #include "dataset/image_io.h"
+#include "dataset/label_images.h"
 #include "dataset/truth.h"
 #include "python/arrays.h"
 
@@ -121,6 +122,15 @@ void bind_datasets(py::module_& module) {
           py::arg("index"),
           "float32 (rows, columns, 3): triangle of the wall and the barycentric coordinates of its "
           "second and third corner; NaN where nothing was hit; None for datasets without.")
+      .def(
+          "label",
+          [](const Dataset& d, const std::string& name, int i) -> py::object {
+            const auto file = label_image(name).file(d.layout, d.index(i));
+            if (!std::filesystem::exists(file)) return py::none();
+            return to_array(d.truth.label(name, d.index(i)));
+          },
+          py::arg("name"), py::arg("index"),
+          "Any label image by the name of its folder below truth/; None for datasets without.")
       .def(
           "tracks",
           [](const Dataset& d, int i) -> py::object {

@@ -22,25 +22,34 @@ struct Scratch {
   explicit Scratch(const PathOptions& options) : paths(options) {}
 };
 
-// Linear RGB of lane k of the surface, before vignetting.
-Vec3f light_of(const Scratch& s, int k, const RenderOptions& options) {
-  Vec3f all =
-      s.radiance.wall[k] * s.surface.material[k].albedo + Vec3f::Constant(s.radiance.coat[k]);
-  if (options.paths.bounces > 0) all += s.indirect[k];
-  return all;
+// Linear RGB towards the camera, before vignetting, by what the light met last.
+struct Light {
+  Vec3f diffuse, indirect;
+  float specular;
+  Vec3f all() const { return diffuse + Vec3f::Constant(specular) + indirect; }
+};
+
+Light light_of(const Scratch& s, int k, const RenderOptions& options) {
+  return {s.radiance.wall[k] * s.surface.material[k].albedo,
+          options.paths.bounces > 0 ? s.indirect[k] : Vec3f(Vec3f::Zero()), s.radiance.coat[k]};
 }
 
 void store(const Scratch& s, const RayTable& rays, const RenderOptions& options,
            CleanFrame& frame) {
+  FrameTruth& truth = frame.truth;
   auto* out = frame.radiance.ptr<Vec3f>();
-  auto* masks = frame.truth.masks.ptr<unsigned char>();
+  auto* masks = truth.masks.ptr<unsigned char>();
   for (int k = 0; k < s.surface.count; ++k) {
     const int i = s.tile.pixel[s.surface.lane[k]];
-    const float light = options.vignetting ? rays.vignetting[i] : 1.0f;
-    const Vec3f all = light_of(s, k, options);
-    out[i] = light * all;
+    const float through = options.vignetting ? rays.vignetting[i] : 1.0f;
+    const Light light = light_of(s, k, options);
+    const Vec3f all = light.all();
+    out[i] = through * all;
+    if (!truth.diffuse.empty()) truth.diffuse.ptr<Vec3f>()[i] = through * light.diffuse;
+    if (!truth.specular.empty()) truth.specular.ptr<float>()[i] = through * light.specular;
+    if (!truth.indirect.empty()) truth.indirect.ptr<Vec3f>()[i] = through * light.indirect;
     masks[i] |= kMaskValid;
-    if (s.radiance.coat[k] > kSpecularShare * luminance(all.x(), all.y(), all.z()))
+    if (light.specular > kSpecularShare * luminance(all.x(), all.y(), all.z()))
       masks[i] |= kMaskSpecular;
   }
 }
@@ -61,19 +70,17 @@ CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous
                                  const FrameView* next, RenderTimes* times) const {
   CleanFrame frame;
   frame.radiance = cv::Mat(rays_.height, rays_.width, CV_32FC3, cv::Scalar::all(0.0));
-  if (options_.labels)
-    frame.truth = empty_truth(rays_.width, rays_.height, previous != nullptr, next != nullptr,
-                              options_.choice);
-  else
-    frame.truth.masks = cv::Mat(rays_.height, rays_.width, CV_8U, cv::Scalar(0));
+  frame.truth =
+      empty_truth(rays_.width, rays_.height, previous != nullptr, next != nullptr, options_.labels);
 
   const Wall& wall = wall_of(now);
   std::optional<OtherFrame> before, after;
-  if (previous && options_.choice.backward_flow)
+  if (previous && options_.labels.backward_flow)
     before.emplace(OtherFrame{*previous, wall_of(*previous)});
-  if (next) after.emplace(OtherFrame{*next, wall_of(*next)});
+  if (next && options_.labels.flow) after.emplace(OtherFrame{*next, wall_of(*next)});
   const LabelView view{wall, before ? &*before : nullptr, after ? &*after : nullptr};
 
+  const bool labelled = options_.labels != LabelSet::none();
   const std::vector<Instant> instants = now.instants(rays_.height);
   const int columns = (rays_.width + kTileWidth - 1) / kTileWidth;
   const int rows = (rays_.height + kTileHeight - 1) / kTileHeight;
@@ -93,7 +100,10 @@ CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous
                        static_cast<std::uint32_t>(now.index), s->indirect);
       store(*s, rays_, options_, frame);
       const double shaded = thread_seconds();
-      if (options_.labels) label_tile(s->tile, rays_, lens_, view, frame.truth);
+      if (labelled) {
+        label_tile(s->tile, rays_, lens_, view, frame.truth);
+        label_surface(s->tile, s->surface, frame.truth);
+      }
       if (times) {
         times->trace_s += traced - start;
         times->shade_s += shaded - traced;
@@ -130,7 +140,7 @@ cv::Mat FrameRenderer::gather(const FrameView& now, const LensSampling& sampling
             static_cast<std::uint32_t>(now.index) + (static_cast<std::uint32_t>(k) << 20),
             s->indirect);
       for (int i = 0; i < s->surface.count; ++i)
-        out[s->tile.pixel[s->surface.lane[i]]] += light_of(*s, i, options_);
+        out[s->tile.pixel[s->surface.lane[i]]] += light_of(*s, i, options_).all();
       if (times) {
         times->trace_s += traced - start;
         times->shade_s += thread_seconds() - traced;

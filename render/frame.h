@@ -20,15 +20,14 @@ struct RenderTimes {
 
 struct RenderOptions {
   bool vignetting = true;
-  bool labels = true;
-  LabelChoice choice = {};  // of those that are not always there
-  PathOptions paths = {};   // of light that comes over other walls
+  LabelSet labels = {};
+  PathOptions paths = {};  // of light that comes over other walls
 };
 
 struct CleanFrame {
   cv::Mat radiance;  // CV_32FC3, linear RGB, after vignetting; 0 where nothing was hit
-  FrameTruth truth;  // the saturated bit is the sensor's to set; empty matrices without labels,
-                     // but for the masks
+  FrameTruth truth;  // the wanted labels, and masks in any case; the saturated bit is the sensor's
+                     // to set
 };
 
 class FrameRenderer {
@@ -52,8 +51,8 @@ class FrameRenderer {
   cv::Mat gather(const FrameView& now, const LensSampling& sampling,
                  RenderTimes* times = nullptr) const;
 
-  bool needs_previous() const { return options_.labels && options_.choice.backward_flow; }
-  bool needs_next() const { return options_.labels; }
+  bool needs_previous() const { return options_.labels.backward_flow; }
+  bool needs_next() const { return options_.labels.flow; }
   const RayTable& rays() const { return rays_; }
   const LensProjector& lens() const { return lens_; }
   const Wall& wall() const { return wall_; }  // at rest

@@ -6,6 +6,8 @@
 namespace rugae {
 namespace {
 
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
 // What flow in either direction needs of a lane.
 struct Seen {
   bool met;
@@ -94,15 +96,18 @@ void label_flow(const Tile& tile, const RayTable& rays, const LensProjector& len
 }  // namespace
 
 FrameTruth empty_truth(int width, int height, bool has_previous, bool has_next,
-                       const LabelChoice& choice) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
+                       const LabelSet& labels) {
   FrameTruth truth;
-  truth.depth_mm = cv::Mat(height, width, CV_32F, cv::Scalar(nan));
-  truth.normal = cv::Mat(height, width, CV_32FC3, cv::Scalar::all(nan));
-  if (has_next) truth.flow_px = cv::Mat(height, width, CV_32FC2, cv::Scalar::all(nan));
-  if (has_previous && choice.backward_flow)
-    truth.backward_flow_px = cv::Mat(height, width, CV_32FC2, cv::Scalar::all(nan));
-  if (choice.triangles) truth.triangle = cv::Mat(height, width, CV_32FC3, cv::Scalar::all(nan));
+  for (const LabelImage& label : label_images()) {
+    if (!(labels.*label.wanted)) continue;
+    if (label.wanted == &LabelSet::flow && !has_next) continue;
+    if (label.wanted == &LabelSet::backward_flow && !has_previous) continue;
+    truth.*label.image = cv::Mat(height, width, label.type, cv::Scalar::all(kNone));
+  }
+  for (cv::Mat* bits : {&truth.masks, &truth.region, &truth.instance})
+    if (!bits->empty()) bits->setTo(0);
+  for (cv::Mat* light : {&truth.diffuse, &truth.specular, &truth.indirect})
+    if (!light->empty()) light->setTo(0.0);
   truth.masks = cv::Mat(height, width, CV_8U, cv::Scalar(0));
   return truth;
 }
@@ -110,6 +115,7 @@ FrameTruth empty_truth(int width, int height, bool has_previous, bool has_next,
 void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& lens,
                 const LabelView& view, FrameTruth& truth) {
   Lanes<Seen> seen;
+  float* const depth = truth.depth_mm.empty() ? nullptr : truth.depth_mm.ptr<float>();
   for (int lane = 0; lane < tile.count; ++lane) {
     const Hit& hit = tile.hit[lane];
     seen[lane].met = hit.met();
@@ -117,11 +123,13 @@ void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& len
     const int i = tile.pixel[lane];
     const Instant& instant = tile.instant_of(lane);
     const Vec3& ray_world = tile.direction_world[lane];
-    truth.depth_mm.ptr<float>()[i] = static_cast<float>(hit.range_mm * rays.directions_cam[i].z());
     const Vec3 winding = view.wall.geometric_normal(hit.triangle, instant.beat);
     const double side = winding.dot(ray_world) > 0.0 ? -1.0 : 1.0;
-    truth.normal.ptr<Vec3f>()[i] =
-        (instant.world_from_camera.transpose() * (side * winding)).cast<float>();
+    if (depth) depth[i] = static_cast<float>(hit.range_mm * rays.directions_cam[i].z());
+    if (!truth.range_mm.empty()) truth.range_mm.ptr<float>()[i] = static_cast<float>(hit.range_mm);
+    if (!truth.normal.empty())
+      truth.normal.ptr<Vec3f>()[i] =
+          (instant.world_from_camera.transpose() * (side * winding)).cast<float>();
     truth.masks.ptr<unsigned char>()[i] |= kMaskValid;
     if (!truth.triangle.empty())
       truth.triangle.ptr<Vec3f>()[i] = Vec3f(static_cast<float>(hit.triangle), hit.b1, hit.b2);
@@ -135,6 +143,21 @@ void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& len
     label_flow(tile, rays, lens, view.wall, *view.previous, seen,
                {truth.backward_flow_px, kMaskBackwardFlowValid, kMaskBackwardFlowOccluded},
                truth.masks);
+}
+
+void label_surface(const Tile& tile, const SurfaceTile& surface, FrameTruth& truth) {
+  for (int k = 0; k < surface.count; ++k) {
+    const int lane = surface.lane[k], i = tile.pixel[lane];
+    if (!truth.shading_normal.empty())
+      truth.shading_normal.ptr<Vec3f>()[i] = (tile.instant_of(lane).world_from_camera.transpose() *
+                                              surface.shading_normal[k].cast<double>())
+                                                 .cast<float>();
+    if (!truth.albedo.empty()) truth.albedo.ptr<Vec3f>()[i] = surface.material[k].albedo;
+    if (!truth.region.empty())
+      truth.region.ptr<unsigned char>()[i] = static_cast<unsigned char>(surface.query[k].region);
+    if (!truth.instance.empty())
+      truth.instance.ptr<unsigned char>()[i] = surface.material[k].instance;
+  }
 }
 
 }  // namespace rugae

@@ -1,22 +1,17 @@
 #pragma once
 // Truth of a frame, worked out tile by tile from the exact hits.
 
+#include "dataset/label_images.h"
 #include "dataset/truth.h"
 #include "render/motion.h"
 #include "render/tile.h"
 
 namespace rugae {
 
-/// Labels that are there on request.
-struct LabelChoice {
-  bool backward_flow = false;
-  bool triangles = false;
-};
-
-/// Matrices of the frame's size, filled with "nothing was hit"; flow only where there is a frame to
-/// flow to.
+/// Matrices of the frame's size, filled with "nothing was hit" (light: none), of the wanted labels,
+/// and masks in any case; flow only where there is a frame to flow to.
 FrameTruth empty_truth(int width, int height, bool has_previous, bool has_next,
-                       const LabelChoice& choice);
+                       const LabelSet& labels);
 
 /// A frame beside the one that is labelled.
 struct OtherFrame {
@@ -30,8 +25,8 @@ struct LabelView {
   const OtherFrame* next = nullptr;
 };
 
-/// Writes depth, normal, flow, triangle and the masks valid, flow valid and flow occluded of the
-/// tile's pixels.
+/// Writes depth, range, normal, flow, triangle and the masks valid, flow valid and flow occluded of
+/// the tile's pixels, as far as `truth` has them.
 ///
 /// Flow leads to where the same material point (triangle and barycentric coordinates) lands in the
 /// other frame, at the time at which the row it lands in is exposed. It is occluded there when the
@@ -40,5 +35,9 @@ struct LabelView {
 /// Safe for different tiles at once.
 void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& lens,
                 const LabelView& view, FrameTruth& truth);
+
+/// Writes shading normal, albedo, region and instance of the tile's pixels, as far as `truth` has
+/// them.
+void label_surface(const Tile& tile, const SurfaceTile& surface, FrameTruth& truth);
 
 }  // namespace rugae

@@ -21,6 +21,10 @@ void write_scene_truth(const Scene& scene, const std::filesystem::path& truth_fo
                  "# Every default and every draw filled in; with seed " +
                      std::to_string(scene.seed) + " it gives the same scene.\n" +
                      scene.resolved_yaml);
+  std::string regions = "region,name\n";
+  for (int r = 0; r <= static_cast<int>(Region::duodenum); ++r)
+    regions += fmt::format("{},{}\n", r, region_name(static_cast<Region>(r)));
+  write_atomic(truth_folder / "regions.csv", regions);
   write_atomic(
       truth_folder / "instances.csv",
       instances_csv(scene.instances ? scene.instances->list() : std::vector<WallInstance>{}));

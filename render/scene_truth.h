@@ -12,7 +12,7 @@ namespace rugae {
 /// that was edited between two runs makes another dataset. Throws Error when it is not JSON.
 std::string with_scene(const std::string& settings, const Scene& scene);
 
-/// Writes scene.yaml and instances.csv into the dataset's truth folder.
+/// Writes scene.yaml, regions.csv and instances.csv into the dataset's truth folder.
 void write_scene_truth(const Scene& scene, const std::filesystem::path& truth_folder);
 
 }  // namespace rugae

@@ -50,8 +50,7 @@ void fields(Visitor& v, OutputSettings& o) {
 
 template <typename Visitor>
 void fields(Visitor& v, TruthSettings& o) {
-  v.flag("backward_flow", o.backward_flow);
-  v.flag("triangles", o.triangles);
+  for (const LabelImage& label : label_images()) v.flag(label.name, o.labels.*label.wanted);
   v.number("tracks", o.tracks, 0, 1000000);
   v.flag("coverage", o.coverage);
 }
@@ -74,8 +73,10 @@ void RenderSettings::check() const {
       lens.samples > 1 || !(lens.motion_blur || lens.defocus),
       "render.lens: {} with samples 1 would be noise alone, expected samples of at least 2",
       lens.motion_blur ? "motion_blur" : "defocus");
-  rugae::check(!truth.coverage || truth.triangles,
+  rugae::check(!truth.coverage || truth.labels.triangles,
                "render.truth: coverage is counted from triangles, expected triangles to be true");
+  rugae::check(!truth.labels.indirect || light.bounces > 0,
+               "render.truth: indirect is true, but render.light.bounces is 0");
 }
 
 void read_settings(YamlReader yaml, RenderSettings& settings) {

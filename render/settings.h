@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/yaml.h"
+#include "dataset/label_images.h"
 #include "render/sensor_settings.h"
 
 namespace rugae {
@@ -18,12 +19,10 @@ struct LensSettings {
   bool defocus = false;         // thin lens with the camera's f-number and focus
 };
 
-/// Labels beyond depth, normals, forward flow and masks.
 struct TruthSettings {
-  bool backward_flow = false;
-  bool triangles = false;  // triangle and barycentric coordinates of every pixel
-  int tracks = 0;          // points of the wall followed over the sequence
-  bool coverage = false;   // in how many frames each triangle is seen; needs triangles
+  LabelSet labels;        // in YAML their names stand beside the others
+  int tracks = 0;         // points of the wall followed over the sequence
+  bool coverage = false;  // in how many frames each triangle is seen; needs triangles
 };
 
 struct LightSettings {
@@ -39,6 +38,8 @@ struct RenderSettings {
   OutputSettings output;
   bool labels = true;  // truth images; false: none of them, whatever `truth` says
   TruthSettings truth;
+  /// The label images that there will be.
+  LabelSet wanted_labels() const { return labels ? truth.labels : LabelSet::none(); }
   /// Throws Error naming the field, its value and its range.
   void check() const;
 };

@@ -94,7 +94,6 @@ DatasetInfo info_of(const SimulateOptions& options, int frames, const Camera& ca
   info.resolution = options.resolution;
   info.seed = options.seed;
   info.frames = frames;
-  info.labels = options.render.labels;
   const OutputSettings& output = options.render.output;
   info.images = {output.frames == FrameFormat::jpeg,
                  output.jpeg_quality,
@@ -103,12 +102,10 @@ DatasetInfo info_of(const SimulateOptions& options, int frames, const Camera& ca
                  output.radiance,
                  output.paired};
   const TruthSettings& truth = options.render.truth;
-  info.truth = {truth.backward_flow,
-                truth.triangles,
-                row_time_s(options.render, camera) > 0.0,
-                static_cast<bool>(scene.motion),
-                truth.tracks > 0,
-                truth.coverage};
+  const bool labels = options.render.labels;
+  info.truth = {options.render.wanted_labels(), row_time_s(options.render, camera) > 0.0,
+                static_cast<bool>(scene.motion), labels && truth.tracks > 0,
+                labels && truth.coverage};
   info.text = with_scene(settings_json(options.render), scene);
   return info;
 }
@@ -263,6 +260,8 @@ class FrameLoop {
     const cv::Mat radiance = sampling_.samples > 1 ? gather(shot.frame, exposure.time_s) : sharp;
     const SensorImages images =
         sensor_.digitise(radiance, exposure, shot.frame, truth.masks, output_.adc, &sensor_s);
+    for (cv::Mat* part : {&truth.diffuse, &truth.specular, &truth.indirect})
+      if (!part->empty()) *part = sensor_.relative(*part, exposure);
     ExtraImages extra{images.adc_bgr, images.mosaic, {}, {}};
     if (output_.radiance) extra.radiance = sensor_.relative(radiance, exposure);
     if (output_.paired) {
@@ -370,8 +369,7 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
     const FrameRenderer renderer(
         scene, camera,
         {.vignetting = options.render.lens.vignetting,
-         .labels = options.render.labels,
-         .choice = {truth.backward_flow, truth.triangles},
+         .labels = options.render.wanted_labels(),
          .paths = {light.bounces, light.samples, light.roulette, mount.noise_seed}});
     const Motion motion(renderer.wall(), scene.motion, path.between,
                         {.frames = frames,

@@ -16,9 +16,7 @@ Surface::Surface(const Scene& scene)
     : wall_(&scene.wall),
       material_([mucosa = &scene.mucosa](std::span<const MaterialQuery> queries,
                                          std::span<MucosaSample> samples) {
-        for (std::size_t i = 0; i < queries.size(); ++i)
-          samples[i] = mucosa->sample(queries[i].rest_position_mm, queries[i].normal,
-                                      queries[i].region, queries[i].footprint_mm);
+        mucosa->sample(queries, samples);
       }) {
   pack(scene.rest_positions, scene.regions);
 }

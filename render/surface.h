@@ -10,13 +10,8 @@
 
 namespace rugae {
 
-/// What a material is asked about.
-struct MaterialQuery {
-  Vec3f rest_position_mm;
-  Vec3f normal;  // of the shading, by the mesh's winding
-  Region region = Region::unknown;
-  float footprint_mm = 0.0f;
-};
+/// What a material is asked about; the normal is that of the shading, by the mesh's winding.
+using MaterialQuery = MucosaPlace;
 /// Fills one sample a query; called once a tile, from many threads.
 using Material = std::function<void(std::span<const MaterialQuery>, std::span<MucosaSample>)>;
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -99,20 +100,52 @@ Mucosa::Mucosa(const MucosaOptions& options, std::uint64_t seed,
                                                NoiseTile(cells, {1.0f, 1.0f, 1.2f, 1.2f})});
 }
 
-MucosaSample Mucosa::sample(const Vec3f& rest_position_mm, const Vec3f& normal, Region region,
-                            float footprint_mm) const {
+// The slow layers of a place, and where the fine ones lie.
+struct Mucosa::Layers {
+  Lanes blotch, mottle, tint;
+  float area_share, patch_share, pit_share, vessels_shown;
+  NoiseTile::Place area, patch, pit, first_vessel, second_vessel;
+};
+
+Mucosa::Layers Mucosa::find_layers(const MucosaPlace& place) const {
   const NoiseTile& smooth = tiles_->smooth;
   const NoiseTile& cells = tiles_->cells;
   const Turns turn = turns();
-  const Lanes p = lanes(rest_position_mm), n = lanes(normal);
+  const Lanes p = lanes(place.rest_position_mm);
   const Lanes pa = turn.a * p, pb = turn.b * p;
+  Layers l;
+  // The warp bends every finer layer, so that no period of a tile is ever seen twice.
+  l.blotch = smooth.fetch(pa * splat(1.0f / kBlotchMm));
+  const Lanes warp = l.blotch * splat(1.5f);
+  l.mottle = cells.fetch((pb + warp) * splat(1.0f / kMottleMm));
+  l.tint = tint_ ? tint_->fetch(p) : lanes(1.0f, 1.0f, 1.0f, 0.5f);
 
-  // Slow layers. The warp bends every finer layer, so that no period of a tile is ever seen twice.
-  const Lanes blotch = smooth.fetch(pa * splat(1.0f / kBlotchMm));
-  const Lanes warp = blotch * splat(1.5f);
-  const Lanes mottle = cells.fetch((pb + warp) * splat(1.0f / kMottleMm));
+  const auto find = [](const NoiseTile& tile, Lanes where, NoiseTile::Place& found) {
+    found = tile.locate(where);
+    NoiseTile::prefetch(found);
+  };
+  l.area_share = survives(place.footprint_mm * (1.0f / kAreaMm));
+  if (l.area_share > 0.0f) find(cells, (p + warp) * splat(1.0f / kAreaMm), l.area);
+  l.patch_share = survives(place.footprint_mm * (1.0f / kPatchMm));
+  if (l.patch_share > 0.0f) find(smooth, (pb - warp) * splat(1.0f / kPatchMm), l.patch);
+  l.pit_share = survives(place.footprint_mm * (1.0f / kFoveolaMm));
+  if (l.pit_share > 0.0f) find(smooth, (pa + warp) * splat(1.0f / kFoveolaMm), l.pit);
+  // Vessels fade in and out over the wall, as they dive.
+  l.vessels_shown = lane<3>(l.tint) * std::clamp(0.35f + 1.2f * lane<0>(l.blotch), 0.0f, 1.0f);
+  if (l.vessels_shown > 0.0f) {
+    const Lanes bend = warp * splat(0.8f);
+    find(smooth, (p + bend) * splat(1.0f / kVesselMm), l.first_vessel);
+    find(smooth, (pb - bend) * splat(1.0f / kVesselMm), l.second_vessel);
+  }
+  return l;
+}
+
+MucosaSample Mucosa::blend(const MucosaPlace& place, const Layers& layers) const {
+  const NoiseTile& smooth = tiles_->smooth;
+  const NoiseTile& cells = tiles_->cells;
+  const Turns turn = turns();
+  const Lanes n = lanes(place.normal), blotch = layers.blotch, mottle = layers.mottle;
   const float blotch_tone = lane<3>(blotch), mottle_tone = lane<2>(mottle);
-  const Lanes tint = tint_ ? tint_->fetch(p) : lanes(1.0f, 1.0f, 1.0f, 0.5f);
 
   // Furrows and tones: `blood` reddens (haemoglobin takes green and blue), `shade` darkens.
   const float contrast = static_cast<float>(options_.mottle_contrast);
@@ -121,23 +154,22 @@ MucosaSample Mucosa::sample(const Vec3f& rest_position_mm, const Vec3f& normal, 
   Lanes slope = _mm_setzero_ps();
   float lost_slope = 0.0f, breaks = 0.0f;
 
-  const float area_share = survives(footprint_mm * (1.0f / kAreaMm));
-  if (area_share > 0.0f) {
-    const Lanes area = cells.fetch((p + warp) * splat(1.0f / kAreaMm));
+  if (const float area_share = layers.area_share; area_share > 0.0f) {
+    const Lanes area = cells.fetch(layers.area);
     blood += area_share * (0.4f * lane<0>(area) + 0.25f * lane<1>(area));
     shade += area_share * (0.12f * lane<0>(area) + 0.2f * lane<2>(area));
   }
-  const float patch_share = survives(footprint_mm * (1.0f / kPatchMm));
+  const float patch_share = layers.patch_share;
   if (patch_share > 0.0f) {
-    const Lanes patch = smooth.fetch((pb - warp) * splat(1.0f / kPatchMm));
+    const Lanes patch = smooth.fetch(layers.patch);
     shade += 0.25f * patch_share * lane<3>(patch);
     breaks = patch_share * lane<3>(patch);
     slope = turn.inverse_b * patch * splat(kLongSlope * patch_share);
   }
   lost_slope += kLongSlope * kLongSlope * (1.0f - patch_share * patch_share);
-  const float pit_share = survives(footprint_mm * (1.0f / kFoveolaMm));
+  const float pit_share = layers.pit_share;
   if (pit_share > 0.0f) {
-    const Lanes pit = smooth.fetch((pa + warp) * splat(1.0f / kFoveolaMm));
+    const Lanes pit = smooth.fetch(layers.pit);
     shade += 0.4f * pit_share * lane<3>(pit);
     blood += 0.2f * pit_share * lane<3>(pit);
     slope = slope + turn.inverse_a * pit * splat(kShortSlope * pit_share);
@@ -146,13 +178,11 @@ MucosaSample Mucosa::sample(const Vec3f& rest_position_mm, const Vec3f& normal, 
 
   // Vessels of the submucosa run where the largest of three fields (two noises and 0) changes
   // hands: lines that meet by threes, as branches do. The distance to such a line is difference /
-  // |gradient of the difference| along the wall. They fade in and out over the wall, as they dive.
+  // |gradient of the difference| along the wall.
   float vessels = 0.0f;
-  const float shown = lane<3>(tint) * std::clamp(0.35f + 1.2f * lane<0>(blotch), 0.0f, 1.0f);
-  if (shown > 0.0f) {
-    const Lanes bend = warp * splat(0.8f);
-    const Lanes first = smooth.fetch((p + bend) * splat(1.0f / kVesselMm));
-    const Lanes second = smooth.fetch((pb - bend) * splat(1.0f / kVesselMm));
+  if (const float shown = layers.vessels_shown; shown > 0.0f) {
+    const Lanes first = smooth.fetch(layers.first_vessel);
+    const Lanes second = smooth.fetch(layers.second_vessel);
     float high = lane<3>(first), low = lane<3>(second);
     Lanes high_slope = first, low_slope = turn.inverse_b * second;
     if (high < low) {
@@ -169,7 +199,7 @@ MucosaSample Mucosa::sample(const Vec3f& rest_position_mm, const Vec3f& normal, 
     const Lanes across = tangential(high_slope - low_slope, n);
     const float steep = std::sqrt(lane<0>(dot3(across, across)) + 0.02f);
     // a line narrower than the pixel keeps its darkness times width
-    const float half = std::max(kVesselHalfMm, 0.5f * footprint_mm);
+    const float half = std::max(kVesselHalfMm, 0.5f * place.footprint_mm);
     const float t = 1.0f - (high - low) * kVesselMm / (2.5f * half * steep);
     // where the fields barely part, a vessel would be a blot
     if (t > 0.0f)
@@ -184,8 +214,8 @@ MucosaSample Mucosa::sample(const Vec3f& rest_position_mm, const Vec3f& normal, 
   const Lanes toned = splat(1.0f) - splat(blood) * lanes(0.16f, 0.55f, 0.50f) -
                       splat(shade) * lanes(0.8f, 0.9f, 0.95f) +
                       splat(ochre) * lanes(0.0f, 0.2f, -0.8f);
-  Lanes albedo = lanes(base_albedo_) * tint;
-  if (region == Region::oesophagus)  // squamous, paler than gastric mucosa
+  Lanes albedo = lanes(base_albedo_) * layers.tint;
+  if (place.region == Region::oesophagus)  // squamous, paler than gastric mucosa
     albedo = albedo * splat(0.8f) + lanes(0.16f, 0.10f, 0.07f);
   out.albedo = vec3(_mm_min_ps(_mm_max_ps(albedo * toned, splat(0.01f)), splat(0.95f)));
 
@@ -204,11 +234,31 @@ MucosaSample Mucosa::sample(const Vec3f& rest_position_mm, const Vec3f& normal, 
   out.roughness = std::sqrt(alpha * alpha + 2.0f * kGradientMeanSquare * lost_slope * calm * calm);
   out.coat_gradient = vec3(tangential(slope, n) * splat(calm));
   if (instances_) {
-    const Vec3 place = rest_position_mm.cast<double>();
-    if (const Instances::Hit hit = instances_->at(place); hit.instance)
-      paint_instance(hit, place, normal, out);
+    const Vec3 at_mm = place.rest_position_mm.cast<double>();
+    if (const Instances::Hit hit = instances_->at(at_mm); hit.instance) {
+      paint_instance(hit, at_mm, place.normal, out);
+      out.instance = static_cast<std::uint8_t>(hit.instance->id);
+    }
   }
   return out;
+}
+
+void Mucosa::sample(std::span<const MucosaPlace> places, std::span<MucosaSample> samples) const {
+  // Enough for memory to arrive meanwhile, few enough to stay in the nearest cache.
+  constexpr std::size_t kTogether = 16;
+  std::array<Layers, kTogether> layers;
+  for (std::size_t begin = 0; begin < places.size(); begin += kTogether) {
+    const std::size_t count = std::min(kTogether, places.size() - begin);
+    for (std::size_t k = 0; k < count; ++k) layers[k] = find_layers(places[begin + k]);
+    for (std::size_t k = 0; k < count; ++k)
+      samples[begin + k] = blend(places[begin + k], layers[k]);
+  }
+}
+
+MucosaSample Mucosa::sample(const Vec3f& rest_position_mm, const Vec3f& normal, Region region,
+                            float footprint_mm) const {
+  const MucosaPlace place{rest_position_mm, normal, region, footprint_mm};
+  return blend(place, find_layers(place));
 }
 
 }  // namespace rugae

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,15 @@ struct MucosaSample {
   Vec3f coat_gradient =
       Vec3f::Zero();  // of the wet layer's height (dimensionless slope, in world axes); tilts its
                       // normal: n_coat = normalize(n - tangential part of the gradient)
+  std::uint8_t instance = 0;  // id of the lesion or object there; 0: none
+};
+
+/// What the mucosa is asked about.
+struct MucosaPlace {
+  Vec3f rest_position_mm;
+  Vec3f normal;  // of the wall, unit, of either side
+  Region region = Region::unknown;
+  float footprint_mm = 0.0f;  // width of a pixel on the wall
 };
 
 struct MucosaOptions {
@@ -60,14 +70,17 @@ class Mucosa {
   Mucosa(const MucosaOptions& options, std::uint64_t seed,
          std::shared_ptr<const RegionTint> tint = nullptr,
          std::shared_ptr<const Instances> instances = nullptr);
-  /// `normal` is the wall's unit normal at rest, of either side. `footprint_mm` is the width of a
-  /// pixel on the wall: detail finer than twice that is faded out, and the slopes that faded go
-  /// into the roughness.
+  /// Detail finer than twice a place's footprint is faded out, and the slopes that faded go into
+  /// the roughness. Neighbours should be neighbours in the list.
+  void sample(std::span<const MucosaPlace> places, std::span<MucosaSample> samples) const;
   MucosaSample sample(const Vec3f& rest_position_mm, const Vec3f& normal, Region region,
                       float footprint_mm) const;
 
  private:
   struct Tiles;
+  struct Layers;
+  Layers find_layers(const MucosaPlace& place) const;
+  MucosaSample blend(const MucosaPlace& place, const Layers& layers) const;
   MucosaOptions options_;
   Vec3f base_albedo_;
   std::shared_ptr<const Tiles> tiles_;

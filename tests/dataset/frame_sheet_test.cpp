@@ -22,8 +22,7 @@ TEST(FrameSheet, HoldsEveryLabelOfTheFrame) {
     }
     return names;
   };
-  EXPECT_EQ(captions(0),
-            (std::vector<std::string>{"depth", "normals", "flow to the next frame", "masks"}));
+  EXPECT_EQ(captions(0), (std::vector<std::string>{"depth", "normals", "masks", "flow"}));
   EXPECT_EQ(captions(4), (std::vector<std::string>{"depth", "normals", "masks"}));
   EXPECT_EQ(message_of([&] { label_tiles(folder.path() / "plane", 5); }),
             (folder.path() / "plane").string() + ": frame 5, expected 0 to 4");

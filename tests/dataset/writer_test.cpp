@@ -261,7 +261,7 @@ TEST(Writer, WithoutLabelsTheDatasetIsStillSound) {
   const TemporaryFolder folder("writer_nolabels");
   const PlaneWorld world;
   DatasetInfo info = world.info();
-  info.labels = false;
+  info.truth.labels = LabelSet::none();
   DatasetWriter writer(folder.path() / "d", info);
   writer.write_scene(world.camera, world.track, world.wall());
   for (int i = 0; i < 5; ++i) writer.write_frame(i, world.image(i), {});

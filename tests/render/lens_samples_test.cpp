@@ -34,8 +34,10 @@ struct EdgeScene {
   // Share of each pixel's light that comes from the bright side; the same samples with and without
   // the edge.
   cv::Mat share(const FrameView& view, const LensSampling& sampling) const {
-    const FrameRenderer with(Surface(wall, edge), camera, {.vignetting = false, .labels = false});
-    const FrameRenderer all(Surface(wall, bright), camera, {.vignetting = false, .labels = false});
+    const FrameRenderer with(Surface(wall, edge), camera,
+                             {.vignetting = false, .labels = LabelSet::none()});
+    const FrameRenderer all(Surface(wall, bright), camera,
+                            {.vignetting = false, .labels = LabelSet::none()});
     const cv::Mat a = with.gather(view, sampling), b = all.gather(view, sampling);
     cv::Mat ratio(a.size(), CV_32F);
     for (int y = 0; y < a.rows; ++y)
@@ -123,7 +125,7 @@ TEST(LensSamples, ATurningCameraSmearsTheBentEdge) {
   constexpr double kTurn_rad_s = 3.0, kExposure_s = 0.5 / kFps;
   const double row_time_s = 0.9 / (kFps * 72);
   const FrameRenderer renderer(Surface(scene.wall, scene.bright), scene.camera,
-                               {.vignetting = false, .labels = false});
+                               {.vignetting = false, .labels = LabelSet::none()});
   const Motion motion(renderer.wall(), {},
                       [](double frame) {
                         const double turned_rad = kTurn_rad_s * (frame - 1.0) / kFps;

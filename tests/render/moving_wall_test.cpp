@@ -14,7 +14,7 @@ namespace {
 
 using test::MovingWorld;
 
-constexpr LabelChoice kAll{.backward_flow = true, .triangles = true};
+constexpr LabelSet kAll{.backward_flow = true, .triangles = true};
 
 class Sequence {
  public:
@@ -262,7 +262,8 @@ TEST(RollingShutter, AVerticalEdgeBendsAsComputed) {
       out[i] = test::lambert(queries[i].rest_position_mm.x() > 0.0f ? 0.8f : 0.0f);
   };
   const TriangleMesh wall = test::plane_mesh(20.0, 400.0, 2);
-  const FrameRenderer renderer(Surface(wall, edge), camera, {.vignetting = false, .labels = false});
+  const FrameRenderer renderer(Surface(wall, edge), camera,
+                               {.vignetting = false, .labels = LabelSet::none()});
   const Motion motion(
       renderer.wall(), {},
       [](double frame) {

@@ -65,8 +65,8 @@ struct MovingWorld {
     return a;
   }
 
-  FrameRenderer renderer(const LabelChoice& choice) const {
-    return {Surface(rest, constant_material(lambert(0.5f))), camera, {true, true, choice}};
+  FrameRenderer renderer(const LabelSet& labels) const {
+    return {Surface(rest, constant_material(lambert(0.5f))), camera, {.labels = labels}};
   }
   Motion motion(const FrameRenderer& renderer) const {
     return {

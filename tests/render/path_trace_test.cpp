@@ -22,7 +22,7 @@ constexpr double kRadius_mm = 25.0;
 cv::Mat radiance_of(const TriangleMesh& wall, const MucosaSample& material, const Camera& camera,
                     const PathOptions& paths, const Rigid3& pose = kAtOrigin, int index = 0) {
   const FrameRenderer renderer(Surface(wall, constant_material(material)), camera,
-                               {.vignetting = false, .labels = false, .paths = paths});
+                               {.vignetting = false, .labels = LabelSet::none(), .paths = paths});
   return renderer.render(pose, nullptr, nullptr, index).radiance;
 }
 

@@ -84,8 +84,8 @@ TEST(Settings, SamplesBlurAndLabels) {
   change_setting("truth.backward_flow=true", settings);
   settings.check();
   EXPECT_TRUE(settings.lens.rolling_shutter);
-  EXPECT_TRUE(settings.truth.backward_flow);
-  EXPECT_FALSE(settings.truth.triangles);
+  EXPECT_TRUE(settings.truth.labels.backward_flow);
+  EXPECT_FALSE(settings.truth.labels.triangles);
 }
 
 }  // namespace

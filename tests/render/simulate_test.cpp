@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <map>
@@ -14,8 +15,10 @@
 #include "core/files.h"
 #include "core/mesh_io.h"
 #include "dataset/check_dataset.h"
+#include "dataset/check_surface_labels.h"
 #include "dataset/frame_list.h"
 #include "dataset/image_io.h"
+#include "dataset/label_images.h"
 #include "dataset/layout.h"
 #include "dataset/observations.h"
 #include "dataset/truth.h"
@@ -134,8 +137,9 @@ TEST_F(Simulate, AMovingWallThroughARollingShutter) {
                "k1: -0.1}\n"
                "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 9000, "
                "read_noise_e: 5, shutter: rolling, row_time_us: 500}\n");
-  options_.render.truth = {
-      .backward_flow = true, .triangles = true, .tracks = 50, .coverage = true};
+  options_.render.truth = {.labels = LabelSet::all(), .tracks = 50, .coverage = true};
+  options_.render.light = {.bounces = 1, .samples = 2};
+  options_.render.output.radiance = true;
   options_.threads = 1;
   run("whole");
   const DatasetCheck found = check_dataset(root_ / "whole");
@@ -165,6 +169,17 @@ TEST_F(Simulate, AMovingWallThroughARollingShutter) {
     coverage += fmt::format("{},{}\n", triangle, frames);
   EXPECT_EQ(read_text(DatasetLayout{root_ / "whole"}.coverage()), coverage);
 
+  // The parts of the light, each in the file's units, are the frame's.
+  const cv::Mat light = read_rgb_exr(DatasetLayout{root_ / "whole"}.radiance(3));
+  const cv::Mat diffuse = truth.label("diffuse", 3), specular = truth.label("specular", 3),
+                indirect = truth.label("indirect", 3);
+  for (int k = 0; k < 64 * 48; ++k) {
+    const Vec3f sum = diffuse.ptr<Vec3f>()[k] + Vec3f::Constant(specular.ptr<float>()[k]) +
+                      indirect.ptr<Vec3f>()[k];
+    ASSERT_TRUE((sum - light.ptr<Vec3f>()[k]).cwiseAbs().maxCoeff() <=
+                1e-6f * light.ptr<Vec3f>()[k].maxCoeff());
+  }
+
   options_.threads = 2;
   run("killed");
   const DatasetLayout layout{root_ / "killed"};
@@ -180,6 +195,50 @@ TEST_F(Simulate, AMovingWallThroughARollingShutter) {
   EXPECT_EQ(check_dataset(root_ / "at once").problems, std::vector<std::string>{});
   EXPECT_EQ(read_text(DatasetLayout{root_ / "at once"}.wall_motion(2)),
             read_text(layout.wall_motion(2)));
+}
+
+// Each label of the surface spoilt in one pixel: check says where and what.
+TEST_F(Simulate, CheckNamesThePixelOfASpoiltLabel) {
+  options_.render.truth.labels = LabelSet::all();
+  options_.render.light = {.bounces = 1, .samples = 1};
+  options_.render.output.radiance = true;
+  options_.frames = 7;
+  run("sound");
+  const Truth truth = Truth::open(root_ / "sound");
+  const DatasetLayout layout{root_ / "sound"};
+  const LabelSources sources{layout, truth.camera().lens, truth.track(), &truth.camera(),
+                             &truth.wall()};
+  const NamedNumbers named = read_named_numbers(layout);
+  ASSERT_TRUE(check_surface_labels(sources, named, 2).empty());
+  const auto spoilt = [&](const char* name, auto spoil) {
+    const LabelImage& label = label_image(name);
+    const fs::path file = label.file(layout, 2);
+    const std::string before = read_text(file);
+    cv::Mat image = truth.label(name, 2);
+    spoil(image);
+    label.write(file, image);
+    const auto problems = check_surface_labels(sources, named, 2);
+    write_atomic(file, before);
+    std::string text = problems.empty() ? "nothing" : problems.front().text;
+    const std::string start = file.string() + ": at column 5, row 3 ";
+    return text.starts_with(start) ? text.substr(start.size()) : text;
+  };
+  const auto number_at = [](cv::Mat& image) -> float& {
+    return image.ptr<float>(3)[5 * image.channels()];
+  };
+  EXPECT_TRUE(
+      spoilt("range", [&](cv::Mat& m) { number_at(m) *= 1.00001f; }).starts_with("the range is "));
+  EXPECT_EQ(spoilt("albedo", [&](cv::Mat& m) { number_at(m) = 1.5f; }),
+            "there is 1.5, more than all light");
+  EXPECT_EQ(spoilt("albedo", [&](cv::Mat& m) { number_at(m) = -0.5f; }), "there is -0.5");
+  EXPECT_EQ(spoilt("specular", [&](cv::Mat& m) { number_at(m) = NAN; }), "there is nan");
+  EXPECT_TRUE(spoilt("diffuse", [&](cv::Mat& m) {
+                number_at(m) *= 1.0001f;
+              }).starts_with("the parts of the light add up to "));
+  EXPECT_EQ(spoilt("regions", [](cv::Mat& m) { m.at<unsigned char>(3, 5) = 77; }),
+            "there is 77, which regions.csv does not name");
+  EXPECT_EQ(spoilt("instances", [](cv::Mat& m) { m.at<unsigned char>(3, 5) = 9; }),
+            "there is 9, which instances.csv does not name");
 }
 
 TEST_F(Simulate, BlurAndDefocusLeaveTheLabelsSharp) {
