@@ -88,7 +88,7 @@ cv::Mat read_image_as_stored(const fs::path& file) { return decode(file, cv::IMR
 
 // n in [-1, 1] -> q = round(32767 n + 32768) in [1, 65535]. Half a step is 1.53e-5 in each
 // component, so the direction errs by at most sqrt(3) times that: 2.6e-5 rad.
-void write_normals(const fs::path& file, const cv::Mat& normal) {
+void write_normals(const fs::path& file, const cv::Mat& normal, bool smooth) {
   check(normal.type() == CV_32FC3, "{}: normals must be CV_32FC3", file.string());
   cv::Mat code(normal.size(), CV_16UC3);
   for (int y = 0; y < normal.rows; ++y) {
@@ -103,7 +103,8 @@ void write_normals(const fs::path& file, const cv::Mat& normal) {
                 : std::uint16_t{0};
       }
   }
-  write_image(file, code);
+  check(lower_extension(file) == ".png", "{}: normals are written as .png", file.string());
+  write_atomic(file, encode_png(code, smooth));
 }
 
 cv::Mat read_normals(const fs::path& file) {

@@ -41,7 +41,9 @@ cv::Mat read_any_exr(const std::filesystem::path& file);
 /// Unit normals (CV_32FC3, NaN where there is none) as a 16-bit PNG: red, green, blue hold round(
 /// 32767 n + 32768 ) of x, y, z; all zero where there is no normal. The direction is kept to 0.0016
 /// degrees.
-void write_normals(const std::filesystem::path& file, const cv::Mat& normal);
+/// Normals that are a number of their own in every pixel (`smooth`) are stored without compression,
+/// which would take four times as long for 2 %.
+void write_normals(const std::filesystem::path& file, const cv::Mat& normal, bool smooth = false);
 /// The same, normalised again after reading.
 cv::Mat read_normals(const std::filesystem::path& file);
 

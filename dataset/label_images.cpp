@@ -74,7 +74,7 @@ void LabelImage::write(const std::filesystem::path& file, const cv::Mat& image) 
     case LabelCoding::share:
       return write_half_rgb(file, image);
     case LabelCoding::normals:
-      return write_normals(file, image);
+      return write_normals(file, image, wanted == &LabelSet::shading_normals);
     case LabelCoding::numbers:
       return write_image(file, image);
   }

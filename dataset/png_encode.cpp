@@ -71,12 +71,13 @@ std::vector<unsigned char> rows_of(const cv::Mat& image) {
   return out;
 }
 
+template <int level>
 std::string deflated(const std::vector<unsigned char>& bytes) {
   struct Free {
     void operator()(libdeflate_compressor* c) const { libdeflate_free_compressor(c); }
   };
   thread_local const std::unique_ptr<libdeflate_compressor, Free> compressor(
-      libdeflate_alloc_compressor(kLevel));
+      libdeflate_alloc_compressor(level));
   check(compressor != nullptr, "PNG: no memory for the compressor");
   std::string out(libdeflate_zlib_compress_bound(compressor.get(), bytes.size()), '\0');
   out.resize(libdeflate_zlib_compress(compressor.get(), bytes.data(), bytes.size(), out.data(),
@@ -86,14 +87,15 @@ std::string deflated(const std::vector<unsigned char>& bytes) {
 
 }  // namespace
 
-std::string encode_png(const cv::Mat& image) {
+std::string encode_png(const cv::Mat& image, bool stored) {
   check(!image.empty() && (image.depth() == CV_8U || image.depth() == CV_16U) &&
             (image.channels() == 1 || image.channels() == 3),
         "PNG: image of type {}, expected 8 or 16 bit with 1 or 3 channels",
         image.empty() ? "none" : cv::typeToString(image.type()));
   std::string out = "\x89PNG\r\n\x1a\n";
   append_chunk(out, "IHDR", header(image));
-  append_chunk(out, "IDAT", deflated(rows_of(image)));
+  append_chunk(out, "IDAT",
+               stored ? deflated<0>(rows_of(image)) : deflated<kLevel>(rows_of(image)));
   append_chunk(out, "IEND", "");
   return out;
 }

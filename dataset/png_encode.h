@@ -9,6 +9,7 @@ namespace rugae {
 
 /// The bytes of a PNG file (ISO/IEC 15948) of an 8 or 16 bit image with one channel, or three in
 /// OpenCV's order BGR. Lossless; the same bytes on every machine.
-std::string encode_png(const cv::Mat& image);
+/// `stored`: not compressed, for images in which there is nothing to find.
+std::string encode_png(const cv::Mat& image, bool stored = false);
 
 }  // namespace rugae

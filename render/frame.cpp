@@ -1,9 +1,9 @@
 #include "render/frame.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include <memory>
 #include <optional>
 
 #include "render/radiance.h"
@@ -17,10 +17,14 @@ struct Scratch {
   SurfaceTile surface;
   RadianceTile radiance;
   Lanes<Vec3f> indirect;
-  PathTracer paths;
+  std::optional<PathTracer> paths;  // where there are bounces
 
-  explicit Scratch(const PathOptions& options) : paths(options) {}
+  explicit Scratch(const PathOptions& options) {
+    if (options.bounces > 0) paths.emplace(options);
+  }
 };
+// One a thread: they are large.
+using Scratches = tbb::enumerable_thread_specific<Scratch>;
 
 // Linear RGB towards the camera, before vignetting, by what the light met last.
 struct Light {
@@ -36,18 +40,20 @@ Light light_of(const Scratch& s, int k, const RenderOptions& options) {
 
 void store(const Scratch& s, const RayTable& rays, const RenderOptions& options,
            CleanFrame& frame) {
-  FrameTruth& truth = frame.truth;
-  auto* out = frame.radiance.ptr<Vec3f>();
-  auto* masks = truth.masks.ptr<unsigned char>();
+  auto* const out = frame.radiance.ptr<Vec3f>();
+  auto* const masks = frame.truth.masks.ptr<unsigned char>();
+  auto* const diffuse = pixels<Vec3f>(frame.truth.diffuse);
+  auto* const specular = pixels<float>(frame.truth.specular);
+  auto* const indirect = pixels<Vec3f>(frame.truth.indirect);
   for (int k = 0; k < s.surface.count; ++k) {
     const int i = s.tile.pixel[s.surface.lane[k]];
     const float through = options.vignetting ? rays.vignetting[i] : 1.0f;
     const Light light = light_of(s, k, options);
     const Vec3f all = light.all();
     out[i] = through * all;
-    if (!truth.diffuse.empty()) truth.diffuse.ptr<Vec3f>()[i] = through * light.diffuse;
-    if (!truth.specular.empty()) truth.specular.ptr<float>()[i] = through * light.specular;
-    if (!truth.indirect.empty()) truth.indirect.ptr<Vec3f>()[i] = through * light.indirect;
+    if (diffuse) diffuse[i] = through * light.diffuse;
+    if (specular) specular[i] = through * light.specular;
+    if (indirect) indirect[i] = through * light.indirect;
     masks[i] |= kMaskValid;
     if (light.specular > kSpecularShare * luminance(all.x(), all.y(), all.z()))
       masks[i] |= kMaskSpecular;
@@ -84,8 +90,9 @@ CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous
   const std::vector<Instant> instants = now.instants(rays_.height);
   const int columns = (rays_.width + kTileWidth - 1) / kTileWidth;
   const int rows = (rays_.height + kTileHeight - 1) / kTileHeight;
+  Scratches scratches(options_.paths);
   tbb::parallel_for(tbb::blocked_range<int>(0, columns * rows, 4), [&](const auto& range) {
-    const auto s = std::make_unique<Scratch>(options_.paths);
+    Scratch* const s = &scratches.local();
     for (int t = range.begin(); t < range.end(); ++t) {
       const double start = thread_seconds();
       place_tile(rays_, instants, t % columns * kTileWidth, t / columns * kTileHeight, s->tile);
@@ -96,8 +103,8 @@ CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous
       wall.surface().look_up(s->tile, rays_, s->surface);
       shade(camera_.lights, wall, s->tile, s->surface, s->radiance);
       if (options_.paths.bounces > 0)
-        s->paths.trace(camera_.lights, wall, s->tile, s->surface,
-                       static_cast<std::uint32_t>(now.index), s->indirect);
+        s->paths->trace(camera_.lights, wall, s->tile, s->surface,
+                        static_cast<std::uint32_t>(now.index), s->indirect);
       store(*s, rays_, options_, frame);
       const double shaded = thread_seconds();
       if (labelled) {
@@ -121,8 +128,9 @@ cv::Mat FrameRenderer::gather(const FrameView& now, const LensSampling& sampling
   const LensSampler sampler(rays_, now, sampling);
   const int columns = (rays_.width + kTileWidth - 1) / kTileWidth;
   const int rows = (rays_.height + kTileHeight - 1) / kTileHeight;
+  Scratches scratches(options_.paths);
   tbb::parallel_for(0, columns * rows, [&](int t) {
-    const auto s = std::make_unique<Scratch>(options_.paths);
+    Scratch* const s = &scratches.local();
     auto* out = radiance.ptr<Vec3f>();
     for (int k = 0; k < sampling.samples; ++k) {
       const double start = thread_seconds();
@@ -135,7 +143,7 @@ cv::Mat FrameRenderer::gather(const FrameView& now, const LensSampling& sampling
       shade(camera_.lights, wall, s->tile, s->surface, s->radiance);
       // Paths of another sample are those of another frame: samples below 2^12, frames below 2^20.
       if (options_.paths.bounces > 0)
-        s->paths.trace(
+        s->paths->trace(
             camera_.lights, wall, s->tile, s->surface,
             static_cast<std::uint32_t>(now.index) + (static_cast<std::uint32_t>(k) << 20),
             s->indirect);

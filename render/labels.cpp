@@ -114,8 +114,12 @@ FrameTruth empty_truth(int width, int height, bool has_previous, bool has_next,
 
 void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& lens,
                 const LabelView& view, FrameTruth& truth) {
+  auto* const depth_mm = pixels<float>(truth.depth_mm);
+  auto* const range_mm = pixels<float>(truth.range_mm);
+  auto* const normal = pixels<Vec3f>(truth.normal);
+  auto* const triangle = pixels<Vec3f>(truth.triangle);
+  auto* const masks = pixels<unsigned char>(truth.masks);
   Lanes<Seen> seen;
-  float* const depth = truth.depth_mm.empty() ? nullptr : truth.depth_mm.ptr<float>();
   for (int lane = 0; lane < tile.count; ++lane) {
     const Hit& hit = tile.hit[lane];
     seen[lane].met = hit.met();
@@ -123,16 +127,15 @@ void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& len
     const int i = tile.pixel[lane];
     const Instant& instant = tile.instant_of(lane);
     const Vec3& ray_world = tile.direction_world[lane];
+    masks[i] |= kMaskValid;
+    if (depth_mm) depth_mm[i] = static_cast<float>(hit.range_mm * rays.directions_cam[i].z());
+    if (range_mm) range_mm[i] = static_cast<float>(hit.range_mm);
+    if (triangle) triangle[i] = Vec3f(static_cast<float>(hit.triangle), hit.b1, hit.b2);
+    if (!normal && !view.next && !view.previous) continue;
     const Vec3 winding = view.wall.geometric_normal(hit.triangle, instant.beat);
     const double side = winding.dot(ray_world) > 0.0 ? -1.0 : 1.0;
-    if (depth) depth[i] = static_cast<float>(hit.range_mm * rays.directions_cam[i].z());
-    if (!truth.range_mm.empty()) truth.range_mm.ptr<float>()[i] = static_cast<float>(hit.range_mm);
-    if (!truth.normal.empty())
-      truth.normal.ptr<Vec3f>()[i] =
-          (instant.world_from_camera.transpose() * (side * winding)).cast<float>();
-    truth.masks.ptr<unsigned char>()[i] |= kMaskValid;
-    if (!truth.triangle.empty())
-      truth.triangle.ptr<Vec3f>()[i] = Vec3f(static_cast<float>(hit.triangle), hit.b1, hit.b2);
+    if (normal)
+      normal[i] = (instant.world_from_camera.transpose() * (side * winding)).cast<float>();
     seen[lane].point_world = tile.eye_of(lane).position_mm + hit.range_mm * ray_world;
     seen[lane].side = side;
   }
@@ -146,17 +149,20 @@ void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& len
 }
 
 void label_surface(const Tile& tile, const SurfaceTile& surface, FrameTruth& truth) {
+  auto* const normal = pixels<Vec3f>(truth.shading_normal);
+  auto* const albedo = pixels<Vec3f>(truth.albedo);
+  auto* const region = pixels<unsigned char>(truth.region);
+  auto* const instance = pixels<unsigned char>(truth.instance);
+  if (!normal && !albedo && !region && !instance) return;
   for (int k = 0; k < surface.count; ++k) {
     const int lane = surface.lane[k], i = tile.pixel[lane];
-    if (!truth.shading_normal.empty())
-      truth.shading_normal.ptr<Vec3f>()[i] = (tile.instant_of(lane).world_from_camera.transpose() *
-                                              surface.shading_normal[k].cast<double>())
-                                                 .cast<float>();
-    if (!truth.albedo.empty()) truth.albedo.ptr<Vec3f>()[i] = surface.material[k].albedo;
-    if (!truth.region.empty())
-      truth.region.ptr<unsigned char>()[i] = static_cast<unsigned char>(surface.query[k].region);
-    if (!truth.instance.empty())
-      truth.instance.ptr<unsigned char>()[i] = surface.material[k].instance;
+    if (normal)
+      normal[i] = (tile.instant_of(lane).world_from_camera.transpose() *
+                   surface.shading_normal[k].cast<double>())
+                      .cast<float>();
+    if (albedo) albedo[i] = surface.material[k].albedo;
+    if (region) region[i] = static_cast<unsigned char>(surface.query[k].region);
+    if (instance) instance[i] = surface.material[k].instance;
   }
 }
 

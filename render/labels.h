@@ -13,6 +13,12 @@ namespace rugae {
 FrameTruth empty_truth(int width, int height, bool has_previous, bool has_next,
                        const LabelSet& labels);
 
+/// The pixels of a label, row by row; null where there is no such label.
+template <typename T>
+T* pixels(cv::Mat& label) {
+  return label.empty() ? nullptr : label.ptr<T>();
+}
+
 /// A frame beside the one that is labelled.
 struct OtherFrame {
   const FrameView& view;

@@ -111,10 +111,13 @@ cv::Mat SensorModel::relative(const cv::Mat& radiance, const Exposure& exposure)
   return share;
 }
 
-int SensorModel::adc(float electrons, const Exposure& exposure) const {
-  const auto scale =
-      static_cast<float>(exposure.gain * (adc_top_ - sensor_.black_level) / sensor_.full_well_e);
-  const float number = electrons * scale + static_cast<float>(sensor_.black_level) + 0.5f;
+float SensorModel::numbers_per_electron(const Exposure& exposure) const {
+  return static_cast<float>(exposure.gain * (adc_top_ - sensor_.black_level) / sensor_.full_well_e);
+}
+
+int SensorModel::adc(float electrons, float numbers_per_electron) const {
+  const float number =
+      electrons * numbers_per_electron + static_cast<float>(sensor_.black_level) + 0.5f;
   if (!(number > 0.0f)) return 0;
   return number >= static_cast<float>(adc_top_) ? adc_top_ : static_cast<int>(number);
 }
@@ -175,6 +178,7 @@ SensorImages SensorModel::digitise(const cv::Mat& radiance, const Exposure& expo
   if (bayer != Bayer::none) images.mosaic.create(radiance.size(), CV_16U);
   if (keep_adc && bayer == Bayer::none) images.adc_bgr.create(radiance.size(), CV_16UC3);
   const auto to_electrons = static_cast<float>(electrons(1.0, exposure));
+  const float to_numbers = numbers_per_electron(exposure);
 
   const std::uint64_t first = static_cast<std::uint64_t>(options_.camera) << kCameraBits;
   const auto expose_row = [&](int y) {
@@ -184,14 +188,14 @@ SensorImages SensorModel::digitise(const cv::Mat& radiance, const Exposure& expo
       const auto e = measure(in[x], to_electrons, frame,
                              first + static_cast<std::uint64_t>(y) * radiance.cols + x);
       if (bayer != Bayer::none) {
-        const int number = adc(e[bayer_channel(bayer, x, y)], exposure);
+        const int number = adc(e[bayer_channel(bayer, x, y)], to_numbers);
         images.mosaic.ptr<std::uint16_t>(y)[x] = static_cast<std::uint16_t>(number);
         if (number == adc_top_) mask[x] |= kMaskSaturated;
         continue;
       }
       auto& out = images.bgr.ptr<cv::Vec3b>(y)[x];
       for (int c = 0; c < 3; ++c) {
-        const int number = adc(e[c], exposure);
+        const int number = adc(e[c], to_numbers);
         out[2 - c] = table(c, number);
         if (number == adc_top_) mask[x] |= kMaskSaturated;
         if (keep_adc)

@@ -69,7 +69,9 @@ class SensorModel {
   /// CV_32FC3, RGB: the light in units of the ADC's full scale, not clipped.
   cv::Mat relative(const cv::Mat& radiance, const Exposure& exposure) const;
   /// The ADC's number for electrons, round half up, clipped to its range.
-  int adc(float electrons, const Exposure& exposure) const;
+  int adc(float electrons, const Exposure& exposure) const {
+    return adc(electrons, numbers_per_electron(exposure));
+  }
   /// The 8-bit value of an ADC number (without white balance).
   unsigned char display(int adc) const { return display_(1, adc); }
   int adc_top() const { return adc_top_; }
@@ -83,6 +85,8 @@ class SensorModel {
                         std::atomic<double>* time_s = nullptr) const;
 
  private:
+  float numbers_per_electron(const Exposure& exposure) const;
+  int adc(float electrons, float numbers_per_electron) const;
   std::array<float, 3> measure(const Vec3f& light, float to_electrons, int frame,
                                std::uint64_t pixel) const;
   void blank(SensorImages& images, cv::Mat& masks) const;

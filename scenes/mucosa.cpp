@@ -4,9 +4,9 @@
 #include <utility>
 
 #include "core/check.h"
+#include "core/float4.h"
 #include "core/random.h"
 #include "scenes/instances.h"
-#include "scenes/lanes.h"
 #include "scenes/lattice_noise.h"
 #include "scenes/noise_tile.h"
 #include "scenes/portable_math.h"
@@ -33,27 +33,55 @@ constexpr float kOilF0 = 0.0362f;                          // n = 1.47
 
 // How much of detail of one cell's size survives a pixel: all of it while the pixel is under a
 // quarter of the size, nothing once it is half of it.
-float survives(float pixels_per_size_inverse) {
-  const float t = std::clamp(2.0f - 4.0f * pixels_per_size_inverse, 0.0f, 1.0f);
-  return t * t * (3.0f - 2.0f * t);
+Float4 survives(Float4 footprint_mm, float size_mm) {
+  const Float4 t = clamp01(splat(2.0f) - splat(4.0f / size_mm) * footprint_mm);
+  return t * t * (splat(3.0f) - splat(2.0f) * t);
 }
 
 // Two rotations that turn the tiles against each other, so that their axes and periods never line
-// up; their inverses (transposes) take gradients back.
-struct Turns {
-  Turn a, b, inverse_a, inverse_b;
-};
-Turns turns() {
-  constexpr float k = 1.0f / 3.0f;
-  return {{lanes(0.6f, 0.64f, 0.48f), lanes(-0.8f, 0.48f, 0.36f), lanes(0.0f, -0.6f, 0.8f)},
-          {lanes(2 * k, 2 * k, -k), lanes(-k, 2 * k, 2 * k), lanes(2 * k, -k, 2 * k)},
-          {lanes(0.6f, -0.8f, 0.0f), lanes(0.64f, 0.48f, -0.6f), lanes(0.48f, 0.36f, 0.8f)},
-          {lanes(2 * k, -k, 2 * k), lanes(2 * k, 2 * k, -k), lanes(-k, 2 * k, 2 * k)}};
+// up; their inverses take gradients back.
+constexpr float kThird = 1.0f / 3.0f;
+constexpr Turn kTurnA{{{0.6f, -0.8f, 0.0f}, {0.64f, 0.48f, -0.6f}, {0.48f, 0.36f, 0.8f}}};
+constexpr Turn kTurnB{{{2 * kThird, -kThird, 2 * kThird},
+                       {2 * kThird, 2 * kThird, -kThird},
+                       {-kThird, 2 * kThird, 2 * kThird}}};
+
+Float4x3 tangential(const Float4x3& g, const Float4x3& normal) {
+  return g - normal * dot(normal, g);
 }
 
-Lanes tangential(Lanes g, Lanes normal) { return g - normal * dot3(normal, g); }
+// 0 below `from`, 1 above `to`, 3 t^2 - 2 t^3 between.
+Float4 smooth_steps(float from, float to, Float4 x) {
+  const Float4 t = clamp01((x - splat(from)) * splat(1.0f / (to - from)));
+  return t * t * (splat(3.0f) - splat(2.0f) * t);
+}
+
+constexpr std::size_t kFour = 4;
 
 }  // namespace
+
+// The last place again where there are fewer than four.
+struct Mucosa::FourPlaces {
+  Float4x3 p, normal;
+  Float4 footprint_mm, squamous;  // the latter a mask
+
+  explicit FourPlaces(std::span<const MucosaPlace> places) {
+    alignas(16) float v[8][kFour];
+    for (std::size_t k = 0; k < kFour; ++k) {
+      const MucosaPlace& from = places[std::min(k, places.size() - 1)];
+      for (int a = 0; a < 3; ++a) {
+        v[a][k] = from.rest_position_mm[a];
+        v[3 + a][k] = from.normal[a];
+      }
+      v[6][k] = from.footprint_mm;
+      v[7][k] = from.region == Region::oesophagus ? 1.0f : 0.0f;
+    }
+    p = {_mm_load_ps(v[0]), _mm_load_ps(v[1]), _mm_load_ps(v[2])};
+    normal = {_mm_load_ps(v[3]), _mm_load_ps(v[4]), _mm_load_ps(v[5])};
+    footprint_mm = _mm_load_ps(v[6]);
+    squamous = above(_mm_load_ps(v[7]), _mm_setzero_ps());
+  }
+};
 
 struct Mucosa::Tiles {
   NoiseTile smooth;  // gradient a cell, and value
@@ -100,165 +128,191 @@ Mucosa::Mucosa(const MucosaOptions& options, std::uint64_t seed,
                                                NoiseTile(cells, {1.0f, 1.0f, 1.2f, 1.2f})});
 }
 
-// The slow layers of a place, and where the fine ones lie.
+// The slow layers of four places, and where the fine ones lie. A layer that shows at none of the
+// four is not looked for.
 struct Mucosa::Layers {
-  Lanes blotch, mottle, tint;
-  float area_share, patch_share, pit_share, vessels_shown;
-  NoiseTile::Place area, patch, pit, first_vessel, second_vessel;
+  Float4x4 blotch, mottle, tint;
+  Float4 area_share, patch_share, pit_share, vessels_shown;
+  bool area_shows, patch_shows, pit_shows, vessels_show;
+  NoiseTile::Places area, patch, pit, first_vessel, second_vessel;
+
+  Layers() {}  // filled by find_layers
 };
 
-Mucosa::Layers Mucosa::find_layers(const MucosaPlace& place) const {
+void Mucosa::find_layers(const FourPlaces& at, Layers& l) const {
   const NoiseTile& smooth = tiles_->smooth;
   const NoiseTile& cells = tiles_->cells;
-  const Turns turn = turns();
-  const Lanes p = lanes(place.rest_position_mm);
-  const Lanes pa = turn.a * p, pb = turn.b * p;
-  Layers l;
+  const Float4x3 &p = at.p, pa = kTurnA * p, pb = kTurnB * p;
   // The warp bends every finer layer, so that no period of a tile is ever seen twice.
-  l.blotch = smooth.fetch(pa * splat(1.0f / kBlotchMm));
-  const Lanes warp = l.blotch * splat(1.5f);
-  l.mottle = cells.fetch((pb + warp) * splat(1.0f / kMottleMm));
-  l.tint = tint_ ? tint_->fetch(p) : lanes(1.0f, 1.0f, 1.0f, 0.5f);
+  l.blotch = smooth.fetch(pa * (1.0f / kBlotchMm));
+  const Float4x3 warp = first3(l.blotch) * 1.5f;
+  l.mottle = cells.fetch((pb + warp) * (1.0f / kMottleMm));
+  l.tint = tint_ ? tint_->fetch(p) : Float4x4{splat(1.0f), splat(1.0f), splat(1.0f), splat(0.5f)};
 
-  const auto find = [](const NoiseTile& tile, Lanes where, NoiseTile::Place& found) {
+  const auto find = [](const NoiseTile& tile, const Float4x3& where, NoiseTile::Places& found) {
     found = tile.locate(where);
-    NoiseTile::prefetch(found);
+    tile.prefetch(found);
   };
-  l.area_share = survives(place.footprint_mm * (1.0f / kAreaMm));
-  if (l.area_share > 0.0f) find(cells, (p + warp) * splat(1.0f / kAreaMm), l.area);
-  l.patch_share = survives(place.footprint_mm * (1.0f / kPatchMm));
-  if (l.patch_share > 0.0f) find(smooth, (pb - warp) * splat(1.0f / kPatchMm), l.patch);
-  l.pit_share = survives(place.footprint_mm * (1.0f / kFoveolaMm));
-  if (l.pit_share > 0.0f) find(smooth, (pa + warp) * splat(1.0f / kFoveolaMm), l.pit);
+  const auto shows = [](Float4 share) { return any(above(share, _mm_setzero_ps())); };
+  l.area_share = survives(at.footprint_mm, kAreaMm);
+  l.patch_share = survives(at.footprint_mm, kPatchMm);
+  l.pit_share = survives(at.footprint_mm, kFoveolaMm);
   // Vessels fade in and out over the wall, as they dive.
-  l.vessels_shown = lane<3>(l.tint) * std::clamp(0.35f + 1.2f * lane<0>(l.blotch), 0.0f, 1.0f);
-  if (l.vessels_shown > 0.0f) {
-    const Lanes bend = warp * splat(0.8f);
-    find(smooth, (p + bend) * splat(1.0f / kVesselMm), l.first_vessel);
-    find(smooth, (pb - bend) * splat(1.0f / kVesselMm), l.second_vessel);
+  l.vessels_shown = l.tint.w * clamp01(splat(0.35f) + splat(1.2f) * l.blotch.x);
+  if ((l.area_shows = shows(l.area_share))) find(cells, (p + warp) * (1.0f / kAreaMm), l.area);
+  if ((l.patch_shows = shows(l.patch_share)))
+    find(smooth, (pb - warp) * (1.0f / kPatchMm), l.patch);
+  if ((l.pit_shows = shows(l.pit_share))) find(smooth, (pa + warp) * (1.0f / kFoveolaMm), l.pit);
+  if ((l.vessels_show = shows(l.vessels_shown))) {
+    const Float4x3 bend = warp * 0.8f;
+    find(smooth, (p + bend) * (1.0f / kVesselMm), l.first_vessel);
+    find(smooth, (pb - bend) * (1.0f / kVesselMm), l.second_vessel);
   }
-  return l;
 }
 
-MucosaSample Mucosa::blend(const MucosaPlace& place, const Layers& layers) const {
+// Vessels of the submucosa run where the largest of three fields (two noises and 0) changes
+// hands: lines that meet by threes, as branches do. The distance to such a line is difference /
+// |gradient of the difference| along the wall.
+Float4 Mucosa::vessels(const FourPlaces& at, const Layers& layers) const {
+  const Float4 zero = _mm_setzero_ps();
+  const Float4x3 flat{zero, zero, zero};
+  const Float4x4 first = tiles_->smooth.fetch(layers.first_vessel);
+  const Float4x4 second = tiles_->smooth.fetch(layers.second_vessel);
+  const Float4x3 first_slope = first3(first), second_slope = kTurnB.inverse() * first3(second);
+  const Float4 second_is_higher = above(second.w, first.w);
+  Float4 high = max(first.w, second.w), low = min(first.w, second.w);
+  Float4x3 high_slope = select(second_is_higher, second_slope, first_slope),
+           low_slope = select(second_is_higher, first_slope, second_slope);
+  // 0 is the highest, or between the two
+  const Float4 both_below = above(zero, high), zero_between = above(zero, low);
+  low = select(both_below, high, max(low, zero));
+  low_slope = select(both_below, high_slope, select(zero_between, flat, low_slope));
+  high = max(high, zero);
+  high_slope = select(both_below, flat, high_slope);
+
+  const Float4x3 across = tangential(high_slope - low_slope, at.normal);
+  const Float4 steep = _mm_sqrt_ps(dot(across, across) + splat(0.02f));
+  // a line narrower than the pixel keeps its darkness times width
+  const Float4 half = max(splat(kVesselHalfMm), splat(0.5f) * at.footprint_mm);
+  const Float4 t = max(zero, splat(1.0f) - (high - low) * splat(kVesselMm / 2.5f) / (half * steep));
+  // where the fields barely part, a vessel would be a blot
+  return layers.vessels_shown * smooth_steps(0.3f, 0.9f, steep) * (splat(kVesselHalfMm) / half) *
+         t * t * t;
+}
+
+void Mucosa::blend(const FourPlaces& at, const Layers& layers,
+                   std::span<MucosaSample> samples) const {
   const NoiseTile& smooth = tiles_->smooth;
   const NoiseTile& cells = tiles_->cells;
-  const Turns turn = turns();
-  const Lanes n = lanes(place.normal), blotch = layers.blotch, mottle = layers.mottle;
-  const float blotch_tone = lane<3>(blotch), mottle_tone = lane<2>(mottle);
+  const Float4x4 &blotch = layers.blotch, &mottle = layers.mottle;
+  const Float4 zero = _mm_setzero_ps(), one = splat(1.0f);
 
   // Furrows and tones: `blood` reddens (haemoglobin takes green and blue), `shade` darkens.
-  const float contrast = static_cast<float>(options_.mottle_contrast);
-  float blood = 1.5f * blotch_tone + 0.8f * mottle_tone;
-  float shade = 0.5f * lane<3>(mottle);
-  Lanes slope = _mm_setzero_ps();
-  float lost_slope = 0.0f, breaks = 0.0f;
-
-  if (const float area_share = layers.area_share; area_share > 0.0f) {
-    const Lanes area = cells.fetch(layers.area);
-    blood += area_share * (0.4f * lane<0>(area) + 0.25f * lane<1>(area));
-    shade += area_share * (0.12f * lane<0>(area) + 0.2f * lane<2>(area));
+  Float4 blood = splat(1.5f) * blotch.w + splat(0.8f) * mottle.z;
+  Float4 shade = splat(0.5f) * mottle.w;
+  Float4x3 slope{zero, zero, zero};
+  Float4 breaks = zero;
+  if (layers.area_shows) {
+    const Float4x4 area = cells.fetch(layers.area);
+    blood = blood + layers.area_share * (splat(0.4f) * area.x + splat(0.25f) * area.y);
+    shade = shade + layers.area_share * (splat(0.12f) * area.x + splat(0.2f) * area.z);
   }
-  const float patch_share = layers.patch_share;
-  if (patch_share > 0.0f) {
-    const Lanes patch = smooth.fetch(layers.patch);
-    shade += 0.25f * patch_share * lane<3>(patch);
-    breaks = patch_share * lane<3>(patch);
-    slope = turn.inverse_b * patch * splat(kLongSlope * patch_share);
+  if (layers.patch_shows) {
+    const Float4x4 patch = smooth.fetch(layers.patch);
+    breaks = layers.patch_share * patch.w;
+    shade = shade + splat(0.25f) * breaks;
+    slope = (kTurnB.inverse() * first3(patch)) * (splat(kLongSlope) * layers.patch_share);
   }
-  lost_slope += kLongSlope * kLongSlope * (1.0f - patch_share * patch_share);
-  const float pit_share = layers.pit_share;
-  if (pit_share > 0.0f) {
-    const Lanes pit = smooth.fetch(layers.pit);
-    shade += 0.4f * pit_share * lane<3>(pit);
-    blood += 0.2f * pit_share * lane<3>(pit);
-    slope = slope + turn.inverse_a * pit * splat(kShortSlope * pit_share);
+  if (layers.pit_shows) {
+    const Float4x4 pit = smooth.fetch(layers.pit);
+    const Float4 tone = layers.pit_share * pit.w;
+    shade = shade + splat(0.4f) * tone;
+    blood = blood + splat(0.2f) * tone;
+    slope = slope + (kTurnA.inverse() * first3(pit)) * (splat(kShortSlope) * layers.pit_share);
   }
-  lost_slope += kShortSlope * kShortSlope * (1.0f - pit_share * pit_share);
-
-  // Vessels of the submucosa run where the largest of three fields (two noises and 0) changes
-  // hands: lines that meet by threes, as branches do. The distance to such a line is difference /
-  // |gradient of the difference| along the wall.
-  float vessels = 0.0f;
-  if (const float shown = layers.vessels_shown; shown > 0.0f) {
-    const Lanes first = smooth.fetch(layers.first_vessel);
-    const Lanes second = smooth.fetch(layers.second_vessel);
-    float high = lane<3>(first), low = lane<3>(second);
-    Lanes high_slope = first, low_slope = turn.inverse_b * second;
-    if (high < low) {
-      std::swap(high, low);
-      std::swap(high_slope, low_slope);
-    }
-    if (high < 0.0f) {
-      low = std::exchange(high, 0.0f);
-      low_slope = std::exchange(high_slope, _mm_setzero_ps());
-    } else if (low < 0.0f) {
-      low = 0.0f;
-      low_slope = _mm_setzero_ps();
-    }
-    const Lanes across = tangential(high_slope - low_slope, n);
-    const float steep = std::sqrt(lane<0>(dot3(across, across)) + 0.02f);
-    // a line narrower than the pixel keeps its darkness times width
-    const float half = std::max(kVesselHalfMm, 0.5f * place.footprint_mm);
-    const float t = 1.0f - (high - low) * kVesselMm / (2.5f * half * steep);
-    // where the fields barely part, a vessel would be a blot
-    if (t > 0.0f)
-      vessels = shown * smooth_step(0.3f, 0.9f, steep) * (kVesselHalfMm / half) * t * t * t;
-  }
+  const auto lost = [one](float unit, Float4 share) {
+    return splat(unit * unit) * (one - share * share);
+  };
+  const Float4 lost_slope =
+      lost(kLongSlope, layers.patch_share) + lost(kShortSlope, layers.pit_share);
+  const Float4 vessel = layers.vessels_show ? vessels(at, layers) : zero;
 
   // Absorption acts on each colour; the limits keep the albedo inside (0, 1) at any contrast.
-  MucosaSample out;
-  blood = contrast * blood + static_cast<float>(options_.vessel_contrast) * vessels;
-  shade *= contrast;
-  const float ochre = 0.5f * contrast * lane<1>(blotch);
-  const Lanes toned = splat(1.0f) - splat(blood) * lanes(0.16f, 0.55f, 0.50f) -
-                      splat(shade) * lanes(0.8f, 0.9f, 0.95f) +
-                      splat(ochre) * lanes(0.0f, 0.2f, -0.8f);
-  Lanes albedo = lanes(base_albedo_) * layers.tint;
-  if (place.region == Region::oesophagus)  // squamous, paler than gastric mucosa
-    albedo = albedo * splat(0.8f) + lanes(0.16f, 0.10f, 0.07f);
-  out.albedo = vec3(_mm_min_ps(_mm_max_ps(albedo * toned, splat(0.01f)), splat(0.95f)));
+  const auto contrast = splat(static_cast<float>(options_.mottle_contrast));
+  blood = contrast * blood + splat(static_cast<float>(options_.vessel_contrast)) * vessel;
+  shade = contrast * shade;
+  const Float4 ochre = splat(0.5f) * contrast * blotch.y;
+  const auto colour = [&](int c, Float4 tint, float reddens, float darkens, float ochres,
+                          float squamous) {
+    Float4 albedo = splat(base_albedo_[c]) * tint;
+    // squamous, paler than gastric mucosa
+    albedo = select(at.squamous, albedo * splat(0.8f) + splat(squamous), albedo);
+    const Float4 toned =
+        one - blood * splat(reddens) - shade * splat(darkens) + ochre * splat(ochres);
+    return min(max(albedo * toned, splat(0.01f)), splat(0.95f));
+  };
 
   // The wet layer: a film with holes, rippled; oil closes the holes and smooths the ripples.
-  const float film = static_cast<float>(options_.wetness) - 0.32f + 1.4f * mottle_tone +
-                     0.9f * lane<2>(blotch) + 1.2f * breaks;
-  const float water = std::clamp(film, 0.0f, 1.0f);
-  const float oily = static_cast<float>(options_.oil) *
-                     std::clamp(0.75f + 0.8f * lane<3>(mottle) + 0.4f * blotch_tone, 0.0f, 1.0f);
-  const float calm = 1.0f - 0.75f * oily;
-  out.coverage = water + (1.0f - water) * oily;
-  out.f0 = kWaterF0 + (kOilF0 - kWaterF0) * oily;
-  const float alpha = kFilmAlpha + (kOilAlpha - kFilmAlpha) * oily;
+  const Float4 film = splat(static_cast<float>(options_.wetness) - 0.32f) + splat(1.4f) * mottle.z +
+                      splat(0.9f) * blotch.z + splat(1.2f) * breaks;
+  const Float4 water = clamp01(film);
+  const Float4 oily = splat(static_cast<float>(options_.oil)) *
+                      clamp01(splat(0.75f) + splat(0.8f) * mottle.w + splat(0.4f) * blotch.w);
+  const Float4 calm = one - splat(0.75f) * oily;
+  const Float4 alpha = splat(kFilmAlpha) + splat(kOilAlpha - kFilmAlpha) * oily;
+  const Float4x3 gradient = tangential(slope, at.normal) * calm;
   // Ripples finer than the pixel act as roughness: alpha^2 = alpha_0^2 + 2 sigma^2 of the slopes
   // lost (Olano and Baker, LEAN mapping, I3D 2010, doi:10.1145/1730804.1730834).
-  out.roughness = std::sqrt(alpha * alpha + 2.0f * kGradientMeanSquare * lost_slope * calm * calm);
-  out.coat_gradient = vec3(tangential(slope, n) * splat(calm));
-  if (instances_) {
-    const Vec3 at_mm = place.rest_position_mm.cast<double>();
-    if (const Instances::Hit hit = instances_->at(at_mm); hit.instance) {
-      paint_instance(hit, at_mm, place.normal, out);
-      out.instance = static_cast<std::uint8_t>(hit.instance->id);
-    }
-  }
-  return out;
+  const Float4 roughness =
+      _mm_sqrt_ps(alpha * alpha + splat(2.0f * kGradientMeanSquare) * lost_slope * calm * calm);
+
+  const Float4x4& tint = layers.tint;
+  const Float4 each[] = {colour(0, tint.x, 0.16f, 0.8f, 0.0f, 0.16f),
+                         colour(1, tint.y, 0.55f, 0.9f, 0.2f, 0.10f),
+                         colour(2, tint.z, 0.50f, 0.95f, -0.8f, 0.07f),
+                         roughness,
+                         water + (one - water) * oily,
+                         splat(kWaterF0) + splat(kOilF0 - kWaterF0) * oily,
+                         gradient.x,
+                         gradient.y,
+                         gradient.z};
+  alignas(16) float v[std::size(each)][kFour];
+  for (std::size_t i = 0; i < std::size(each); ++i) _mm_store_ps(v[i], each[i]);
+  for (std::size_t k = 0; k < samples.size(); ++k)
+    samples[k] = {
+        {v[0][k], v[1][k], v[2][k]}, v[3][k], v[4][k], v[5][k], {v[6][k], v[7][k], v[8][k]}};
 }
 
 void Mucosa::sample(std::span<const MucosaPlace> places, std::span<MucosaSample> samples) const {
   // Enough for memory to arrive meanwhile, few enough to stay in the nearest cache.
   constexpr std::size_t kTogether = 16;
-  std::array<Layers, kTogether> layers;
+  std::array<Layers, kTogether / kFour> layers;
   for (std::size_t begin = 0; begin < places.size(); begin += kTogether) {
-    const std::size_t count = std::min(kTogether, places.size() - begin);
-    for (std::size_t k = 0; k < count; ++k) layers[k] = find_layers(places[begin + k]);
-    for (std::size_t k = 0; k < count; ++k)
-      samples[begin + k] = blend(places[begin + k], layers[k]);
+    const auto batch = places.subspan(begin, std::min(kTogether, places.size() - begin));
+    const auto four = [&batch](std::size_t k) {
+      return batch.subspan(k, std::min(kFour, batch.size() - k));
+    };
+    for (std::size_t k = 0; k < batch.size(); k += kFour)
+      find_layers(FourPlaces(four(k)), layers[k / kFour]);
+    for (std::size_t k = 0; k < batch.size(); k += kFour)
+      blend(FourPlaces(four(k)), layers[k / kFour], samples.subspan(begin + k, four(k).size()));
+  }
+  if (!instances_) return;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const Vec3 at_mm = places[k].rest_position_mm.cast<double>();
+    const Instances::Hit hit = instances_->at(at_mm);
+    if (!hit.instance) continue;
+    paint_instance(hit, at_mm, places[k].normal, samples[k]);
+    samples[k].instance = static_cast<std::uint8_t>(hit.instance->id);
   }
 }
 
 MucosaSample Mucosa::sample(const Vec3f& rest_position_mm, const Vec3f& normal, Region region,
                             float footprint_mm) const {
   const MucosaPlace place{rest_position_mm, normal, region, footprint_mm};
-  return blend(place, find_layers(place));
+  MucosaSample sample;
+  this->sample({&place, 1}, {&sample, 1});
+  return sample;
 }
 
 }  // namespace rugae

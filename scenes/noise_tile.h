@@ -7,8 +7,8 @@
 #include <functional>
 #include <vector>
 
+#include "core/float4.h"
 #include "core/types.h"
-#include "scenes/lanes.h"
 
 namespace rugae {
 
@@ -22,63 +22,75 @@ class NoiseTile {
   /// after kCells. Channel c is stored in [-range[c], range[c]].
   NoiseTile(const std::function<Channels(const Vec3&)>& value, const Channels& range);
 
-  /// Where a position lies in the tile: the rows of voxels around it, and its shares of them.
-  struct Place {
-    const std::int16_t *near, *near_up, *far, *far_up;
-    __m128i wx;
-    Lanes fy, fz;
+  /// Where four positions lie in the tile: the rows of voxels around them, as indices, and their
+  /// shares of them.
+  struct Places {
+    alignas(16) std::array<std::int32_t, 4> near, near_up, far, far_up;
+    __m128i wx;  // of a row's two voxels, 15 bits each
+    Float4 fy, fz;
   };
-  /// `cells` is a position in lattice cells (within 1e5 cells of 0; the fourth lane is not used).
-  Place locate(Lanes cells) const {
-    constexpr float kScale = static_cast<float>(kVoxels) / kCells;
-    const Lanes p = cells * splat(kScale);
-    // floor and fraction; truncation rounds negative numbers up, so those step down by one
-    __m128i whole = _mm_cvttps_epi32(p);
-    Lanes fraction = p - _mm_cvtepi32_ps(whole);
-    const Lanes below = _mm_cmplt_ps(fraction, _mm_setzero_ps());
-    whole = _mm_add_epi32(whole, _mm_castps_si128(below));
-    fraction = fraction + _mm_and_ps(below, splat(1.0f));
-    alignas(16) std::int32_t i[4];
-    _mm_store_si128(reinterpret_cast<__m128i*>(i),
-                    _mm_and_si128(whole, _mm_set1_epi32(kVoxels - 1)));
-
-    const int fx = _mm_cvttss_si32(_mm_mul_ss(fraction, _mm_set_ss(kWeights)));
-    constexpr int kNextY = 4 * kRow, kNextZ = kNextY * kVoxels, kMask = kVoxels - 1;
-    const std::int16_t* near = voxels_.data() + 4 * i[0] + kNextY * i[1] + kNextZ * i[2];
-    const std::int16_t* far = near + (i[2] == kMask ? -kMask * kNextZ : kNextZ);
-    const int up = i[1] == kMask ? -kMask * kNextY : kNextY;
-    return {near,
-            near + up,
-            far,
-            far + up,
-            _mm_set1_epi32(fx << 16 | (kWeights - fx)),
-            _mm_shuffle_ps(fraction, fraction, _MM_SHUFFLE(1, 1, 1, 1)),
-            _mm_shuffle_ps(fraction, fraction, _MM_SHUFFLE(2, 2, 2, 2))};
+  /// `cells` are positions in lattice cells, within 1e5 cells of 0.
+  Places locate(const Float4x3& cells) const {
+    const Float4 scale = splat(static_cast<float>(kVoxels) / kCells);
+    const Floor x = floor_of(cells.x * scale), y = floor_of(cells.y * scale),
+                z = floor_of(cells.z * scale);
+    const __m128i wrap = _mm_set1_epi32(kVoxels - 1), one = _mm_set1_epi32(1);
+    const __m128i y0 = _mm_and_si128(y.whole, wrap), z0 = _mm_and_si128(z.whole, wrap);
+    const __m128i y1 = _mm_and_si128(_mm_add_epi32(y0, one), wrap),
+                  z1 = _mm_and_si128(_mm_add_epi32(z0, one), wrap);
+    const __m128i x0 = _mm_slli_epi32(_mm_and_si128(x.whole, wrap), 2);
+    const auto store = [x0](__m128i row, __m128i slice, std::array<std::int32_t, 4>& index) {
+      constexpr int kNextY = 4 * kRow, kNextZ = kNextY * kVoxels;
+      static_assert(kNextZ < 1 << 15, "fits the 16-bit factors");
+      const __m128i at = _mm_madd_epi16(_mm_or_si128(row, _mm_slli_epi32(slice, 16)),
+                                        _mm_set1_epi32(kNextZ << 16 | kNextY));
+      _mm_store_si128(reinterpret_cast<__m128i*>(index.data()), _mm_add_epi32(at, x0));
+    };
+    Places places;
+    store(y0, z0, places.near);
+    store(y1, z0, places.near_up);
+    store(y0, z1, places.far);
+    store(y1, z1, places.far_up);
+    const __m128i fx = _mm_cvttps_epi32(x.part * splat(kWeights));
+    places.wx = _mm_or_si128(_mm_slli_epi32(fx, 16), _mm_sub_epi32(_mm_set1_epi32(kWeights), fx));
+    places.fy = y.part;
+    places.fz = z.part;
+    return places;
   }
-  /// Asks for the memory of a place that will be fetched soon: the tile is larger than the nearest
+  /// Asks for the memory of places that will be fetched soon: the tile is larger than the nearest
   /// caches, and fine layers jump about in it.
-  static void prefetch(const Place& place) {
-    for (const std::int16_t* row : {place.near, place.near_up, place.far, place.far_up})
-      _mm_prefetch(reinterpret_cast<const char*>(row), _MM_HINT_T0);
+  void prefetch(const Places& places) const {
+    for (const auto* index : {&places.near, &places.near_up, &places.far, &places.far_up})
+      for (const std::int32_t i : *index)
+        _mm_prefetch(reinterpret_cast<const char*>(voxels_.data() + i), _MM_HINT_T0);
   }
   /// The four channels. Across x in 15-bit integers, across y and z in single precision.
-  Lanes fetch(const Place& place) const {
-    const Lanes near = mix(row(place.near, place.wx), row(place.near_up, place.wx), place.fy);
-    const Lanes far = mix(row(place.far, place.wx), row(place.far_up, place.wx), place.fy);
-    return mix(near, far, place.fz) * _mm_loadu_ps(step_.data());
+  Float4x4 fetch(const Places& p) const {
+    const Float4 step = _mm_loadu_ps(step_.data());
+    return transposed(fetch_one<0>(p) * step, fetch_one<1>(p) * step, fetch_one<2>(p) * step,
+                      fetch_one<3>(p) * step);
   }
-  Lanes fetch(Lanes cells) const { return fetch(locate(cells)); }
+  Float4x4 fetch(const Float4x3& cells) const { return fetch(locate(cells)); }
 
  private:
   static constexpr int kRow = kVoxels + 1;  // the first voxel again at the end: no wrap in x
   static constexpr int kWeights = 32767;
 
-  static Lanes mix(Lanes a, Lanes b, Lanes t) { return a + t * (b - a); }
+  static Float4 mix(Float4 a, Float4 b, Float4 t) { return a + t * (b - a); }
   // Both voxels of a row in one load; each channel's pair is weighted and added in one step.
-  static Lanes row(const std::int16_t* first, __m128i weights) {
-    const __m128i both = _mm_loadu_si128(reinterpret_cast<const __m128i*>(first));
+  Float4 row(std::int32_t first, __m128i weights) const {
+    const __m128i both = _mm_loadu_si128(reinterpret_cast<const __m128i*>(voxels_.data() + first));
     const __m128i pairs = _mm_unpacklo_epi16(both, _mm_srli_si128(both, 8));
     return _mm_cvtepi32_ps(_mm_madd_epi16(pairs, weights));
+  }
+  template <int i>
+  Float4 fetch_one(const Places& p) const {
+    constexpr int kAll = _MM_SHUFFLE(i, i, i, i);
+    const __m128i wx = _mm_shuffle_epi32(p.wx, kAll);
+    const Float4 fy = _mm_shuffle_ps(p.fy, p.fy, kAll), fz = _mm_shuffle_ps(p.fz, p.fz, kAll);
+    const Float4 near = mix(row(p.near[i], wx), row(p.near_up[i], wx), fy);
+    const Float4 far = mix(row(p.far[i], wx), row(p.far_up[i], wx), fy);
+    return mix(near, far, fz);
   }
 
   std::vector<std::int16_t> voxels_;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 
 namespace rugae {
 namespace {
@@ -68,25 +69,38 @@ RegionTint::RegionTint(const Eigen::AlignedBox3d& box,
     }
 }
 
-Lanes RegionTint::fetch(Lanes rest_position_mm) const {
-  const Lanes cells =
-      (rest_position_mm - lanes(origin_)) * splat(static_cast<float>(1.0 / kStepMm));
-  alignas(16) float p[4];
-  _mm_store_ps(p, cells);
-  int whole[3];
-  float part[3];
-  for (int a = 0; a < 3; ++a) {
-    const float inside = std::clamp(p[a], 0.0f, static_cast<float>(size_[a] - 1));
-    whole[a] = std::min(static_cast<int>(inside), size_[a] - 2);
-    part[a] = inside - static_cast<float>(whole[a]);
-  }
-  const auto mix = [](Lanes a, Lanes b, float t) { return a + splat(t) * (b - a); };
-  const auto plane = [&](int z) {
-    const int x = whole[0], y = whole[1];
-    return mix(mix(at(x, y, z), at(x + 1, y, z), part[0]),
-               mix(at(x, y + 1, z), at(x + 1, y + 1, z), part[0]), part[1]);
+Float4x4 RegionTint::fetch(const Float4x3& p) const {
+  // whole node below and the share of the next, along one axis
+  struct Axis {
+    alignas(16) std::array<std::int32_t, 4> node;
+    alignas(16) std::array<float, 4> part;
   };
-  return mix(plane(whole[2]), plane(whole[2] + 1), part[2]);
+  const auto axis = [](Float4 position, float origin, int size) {
+    const Float4 cells = (position - splat(origin)) * splat(static_cast<float>(1.0 / kStepMm));
+    const Float4 inside = min(max(cells, _mm_setzero_ps()), splat(static_cast<float>(size - 1)));
+    const Float4 below =
+        _mm_cvtepi32_ps(_mm_cvttps_epi32(min(inside, splat(static_cast<float>(size - 2)))));
+    Axis a;
+    _mm_store_si128(reinterpret_cast<__m128i*>(a.node.data()), _mm_cvttps_epi32(below));
+    _mm_store_ps(a.part.data(), inside - below);
+    return a;
+  };
+  const Axis x = axis(p.x, origin_.x(), size_.x()), y = axis(p.y, origin_.y(), size_.y()),
+             z = axis(p.z, origin_.z(), size_.z());
+  const auto mix = [](Float4 a, Float4 b, Float4 t) { return a + t * (b - a); };
+  const int up = 4 * size_.x(), deep = up * size_.y();
+  Float4 each[4];
+  for (int i = 0; i < 4; ++i) {
+    const Float4 fx = splat(x.part[i]), fy = splat(y.part[i]), fz = splat(z.part[i]);
+    const float* const near =
+        &nodes_[static_cast<std::size_t>(4 * x.node[i] + up * y.node[i] + deep * z.node[i])];
+    const auto along = [&mix, fx](const float* first) {
+      return mix(_mm_loadu_ps(first), _mm_loadu_ps(first + 4), fx);
+    };
+    const auto plane = [&](const float* first) { return mix(along(first), along(first + up), fy); };
+    each[i] = mix(plane(near), plane(near + deep), fz);
+  }
+  return transposed(each[0], each[1], each[2], each[3]);
 }
 
 }  // namespace rugae

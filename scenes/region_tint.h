@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "scenes/lanes.h"
+#include "core/float4.h"
 #include "scenes/scene.h"
 
 namespace rugae {
@@ -17,13 +17,9 @@ class RegionTint {
 
   /// Factors on red, green and blue of the body's albedo, and how well submucosal vessels show
   /// through (0 to 1). Outside the box: what its nearest face has.
-  Lanes fetch(Lanes rest_position_mm) const;
+  Float4x4 fetch(const Float4x3& rest_position_mm) const;
 
  private:
-  Lanes at(int x, int y, int z) const {
-    return _mm_loadu_ps(
-        &nodes_[4 * (x + size_.x() * (y + static_cast<std::size_t>(size_.y()) * z))]);
-  }
   Vec3f origin_;
   Vec3i size_;
   std::vector<float> nodes_;  // four a node, x fastest

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/float4.h"
 #include "core/mesh.h"
 
 namespace rugae {
@@ -78,9 +79,11 @@ class Mucosa {
 
  private:
   struct Tiles;
+  struct FourPlaces;
   struct Layers;
-  Layers find_layers(const MucosaPlace& place) const;
-  MucosaSample blend(const MucosaPlace& place, const Layers& layers) const;
+  void find_layers(const FourPlaces& at, Layers& layers) const;
+  Float4 vessels(const FourPlaces& at, const Layers& layers) const;
+  void blend(const FourPlaces& at, const Layers& layers, std::span<MucosaSample> samples) const;
   MucosaOptions options_;
   Vec3f base_albedo_;
   std::shared_ptr<const Tiles> tiles_;

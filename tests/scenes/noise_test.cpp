@@ -69,8 +69,19 @@ TEST(NoiseTile, GivesBackWhatItHoldsAndInterpolates) {
   constexpr float kTolerance = 1.5e-3f;
   for (int i = 0; i < 500; ++i) {
     const Vec3f p(0.137f * i - 31.0f, -0.071f * i + 3.0f, 0.213f * i - 17.0f);
-    const Lanes fetched = tile.fetch(lanes(p));
-    const float c[] = {lane<0>(fetched), lane<1>(fetched), lane<2>(fetched), lane<3>(fetched)};
+    // Lane by lane: other places in the other lanes.
+    alignas(16) float at[3][4], c[4];
+    for (int axis = 0; axis < 3; ++axis)
+      for (int lane = 0; lane < 4; ++lane)
+        at[axis][lane] = lane == i % 4 ? p[axis] : 100.0f * lane + axis;
+    const Float4x4 fetched =
+        tile.fetch({_mm_load_ps(at[0]), _mm_load_ps(at[1]), _mm_load_ps(at[2])});
+    int channel = 0;
+    for (const Float4 value : {fetched.x, fetched.y, fetched.z, fetched.w}) {
+      alignas(16) float each[4];
+      _mm_store_ps(each, value);
+      c[channel++] = each[i % 4];
+    }
     const float w = static_cast<float>(2.0 * M_PI / NoiseTile::kCells);
     EXPECT_NEAR(c[0], std::sin(w * p.x()), kTolerance);
     EXPECT_NEAR(c[1], std::cos(w * p.y()), kTolerance);
