@@ -17,6 +17,7 @@ struct Scratch {
   SurfaceTile surface;
   RadianceTile radiance;
   Lanes<Vec3f> indirect;
+  LensSampler::Shifts shifts;
   std::optional<PathTracer> paths;  // where there are bounces
 
   explicit Scratch(const PathOptions& options) {
@@ -79,6 +80,7 @@ CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous
   frame.truth =
       empty_truth(rays_.width, rays_.height, previous != nullptr, next != nullptr, options_.labels);
 
+  if (options_.keep_materials) frame.materials.resize(rays_.size());
   const Wall& wall = wall_of(now);
   std::optional<OtherFrame> before, after;
   if (previous && options_.labels.backward_flow)
@@ -106,6 +108,10 @@ CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous
         s->paths->trace(camera_.lights, wall, s->tile, s->surface,
                         static_cast<std::uint32_t>(now.index), s->indirect);
       store(*s, rays_, options_, frame);
+      if (options_.keep_materials)
+        for (int k = 0; k < s->surface.count; ++k)
+          frame.materials[static_cast<std::size_t>(s->tile.pixel[s->surface.lane[k]])] = {
+              s->surface.query[k].rest_position_mm, s->surface.material[k], true};
       const double shaded = thread_seconds();
       if (labelled) {
         label_tile(s->tile, rays_, lens_, view, frame.truth);
@@ -122,7 +128,7 @@ CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous
 }
 
 cv::Mat FrameRenderer::gather(const FrameView& now, const LensSampling& sampling,
-                              RenderTimes* times) const {
+                              RenderTimes* times, std::span<const PixelMaterial> materials) const {
   cv::Mat radiance(rays_.height, rays_.width, CV_32FC3, cv::Scalar::all(0.0));
   const Wall& wall = wall_of(now);
   const LensSampler sampler(rays_, now, sampling);
@@ -132,14 +138,15 @@ cv::Mat FrameRenderer::gather(const FrameView& now, const LensSampling& sampling
   tbb::parallel_for(0, columns * rows, [&](int t) {
     Scratch* const s = &scratches.local();
     auto* out = radiance.ptr<Vec3f>();
+    sampler.begin(t % columns * kTileWidth, t / columns * kTileHeight, s->tile, s->shifts);
     for (int k = 0; k < sampling.samples; ++k) {
       const double start = thread_seconds();
-      sampler.place(k, t % columns * kTileWidth, t / columns * kTileHeight, s->tile);
+      sampler.place(k, s->shifts, s->tile);
       const auto n = static_cast<std::size_t>(s->tile.count);
       wall.raycaster().intersect(s->tile.eyes(), {s->tile.direction_world.data(), n},
                                  {s->tile.hit.data(), n});
       const double traced = thread_seconds();
-      wall.surface().look_up(s->tile, rays_, s->surface);
+      wall.surface().look_up(s->tile, rays_, s->surface, materials);
       shade(camera_.lights, wall, s->tile, s->surface, s->radiance);
       // Paths of another sample are those of another frame: samples below 2^12, frames below 2^20.
       if (options_.paths.bounces > 0)

@@ -21,13 +21,15 @@ struct RenderTimes {
 struct RenderOptions {
   bool vignetting = true;
   LabelSet labels = {};
-  PathOptions paths = {};  // of light that comes over other walls
+  PathOptions paths = {};       // of light that comes over other walls
+  bool keep_materials = false;  // for gather
 };
 
 struct CleanFrame {
   cv::Mat radiance;  // CV_32FC3, linear RGB, after vignetting; 0 where nothing was hit
   FrameTruth truth;  // the wanted labels, and masks in any case; the saturated bit is the sensor's
                      // to set
+  std::vector<PixelMaterial> materials;  // one a pixel, where they are kept
 };
 
 class FrameRenderer {
@@ -47,9 +49,10 @@ class FrameRenderer {
                     RenderTimes* times = nullptr, int index = 0) const;
 
   /// The radiance alone (CV_32FC3, as in CleanFrame), gathered over pixel, aperture and exposure:
-  /// the mean of the samples.
-  cv::Mat gather(const FrameView& now, const LensSampling& sampling,
-                 RenderTimes* times = nullptr) const;
+  /// the mean of the samples. With the materials of the sharp frame those are looked up once a
+  /// pixel and not once a sample, where the samples meet the wall within its footprint.
+  cv::Mat gather(const FrameView& now, const LensSampling& sampling, RenderTimes* times = nullptr,
+                 std::span<const PixelMaterial> materials = {}) const;
 
   bool needs_previous() const { return options_.labels.backward_flow; }
   bool needs_next() const { return options_.labels.flow; }

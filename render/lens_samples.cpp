@@ -81,16 +81,21 @@ Vec3 LensSampler::beside(int pixel, double dx, double dy) const {
   return d / std::sqrt(d.squaredNorm());
 }
 
-void LensSampler::place(int k, int x0, int y0, Tile& tile) const {
+void LensSampler::begin(int x0, int y0, Tile& tile, Shifts& shifts) const {
   place_pixels(rays_, x0, y0, tile);
   tile.instants = instants_;
   tile.one_eye = instants_.size() == 1 && !(sampling_.aperture_radius_mm > 0.0);
+  for (int lane = 0; lane < tile.count; ++lane)
+    shifts[lane] = random_words(sampling_.seed, Purpose::lens_samples, sampling_.frame,
+                                static_cast<std::uint64_t>(tile.pixel[lane]));
+}
+
+void LensSampler::place(int k, const Shifts& shifts, Tile& tile) const {
   std::array<std::uint32_t, 4> point;
   for (int d = 0; d < 4; ++d) point[d] = sobol(static_cast<std::uint32_t>(k), d);
   for (int lane = 0; lane < tile.count; ++lane) {
     const int pixel = tile.pixel[lane];
-    const auto shift = random_words(sampling_.seed, Purpose::lens_samples, sampling_.frame,
-                                    static_cast<std::uint64_t>(pixel));
+    const auto& shift = shifts[lane];
     const auto at = [&](int d) { return uniform01(point[d] ^ shift[d]); };
     int instant = rows_alike_ ? 0 : pixel / rays_.width * instants_a_row_;
     if (instants_a_row_ > 1) {

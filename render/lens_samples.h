@@ -1,6 +1,7 @@
 #pragma once
 // The rays by which a pixel gathers light over its area, the aperture and the exposure.
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -34,8 +35,12 @@ class LensSampler {
   /// neighbours: it errs by less than 0.001 px for lenses as wide as 100 degrees.
   LensSampler(const RayTable& rays, const FrameView& view, const LensSampling& sampling);
 
-  /// Fills the rays of sample `k` for the tile whose first pixel is (x0, y0).
-  void place(int k, int x0, int y0, Tile& tile) const;
+  /// The digital shifts of a tile's pixels.
+  using Shifts = Lanes<std::array<std::uint32_t, 4>>;
+  /// Begins the tile whose first pixel is (x0, y0).
+  void begin(int x0, int y0, Tile& tile, Shifts& shifts) const;
+  /// Fills the rays of sample `k` for the tile that was begun.
+  void place(int k, const Shifts& shifts, Tile& tile) const;
 
  private:
   Vec3 beside(int pixel, double dx, double dy) const;

@@ -213,11 +213,11 @@ class FrameLoop {
   }
 
   // What the sharp frame was metered for, gathered over pixel, aperture and exposure.
-  cv::Mat gather(int frame, double exposure_s) {
+  cv::Mat gather(int frame, double exposure_s, std::span<const PixelMaterial> materials) {
     LensSampling sampling = sampling_;
     sampling.frame = static_cast<std::uint32_t>(frame);
     sampling.exposure_s = blurs_ ? exposure_s : 0.0;
-    return renderer_.gather(motion_.view(frame), sampling, &times);
+    return renderer_.gather(motion_.view(frame), sampling, &times, materials);
   }
 
   ShotPtr shoot(int frame) {
@@ -257,7 +257,8 @@ class FrameLoop {
     FrameTruth& truth = shot.clean.truth;
     const Exposure& exposure = shot.exposure.used;
     const cv::Mat& sharp = shot.clean.radiance;
-    const cv::Mat radiance = sampling_.samples > 1 ? gather(shot.frame, exposure.time_s) : sharp;
+    const cv::Mat radiance =
+        sampling_.samples > 1 ? gather(shot.frame, exposure.time_s, shot.clean.materials) : sharp;
     const SensorImages images =
         sensor_.digitise(radiance, exposure, shot.frame, truth.masks, output_.adc, &sensor_s);
     for (cv::Mat* part : {&truth.diffuse, &truth.specular, &truth.indirect})
@@ -370,7 +371,8 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
         scene, camera,
         {.vignetting = options.render.lens.vignetting,
          .labels = options.render.wanted_labels(),
-         .paths = {light.bounces, light.samples, light.roulette, mount.noise_seed}});
+         .paths = {light.bounces, light.samples, light.roulette, mount.noise_seed},
+         .keep_materials = options.render.lens.samples > 1});
     const Motion motion(renderer.wall(), scene.motion, path.between,
                         {.frames = frames,
                          .fps = camera.sensor.fps,

@@ -49,15 +49,39 @@ void Surface::find_triangle_normals() {
     triangle_normals_[t] = triangle_normal(*wall_, t).cast<float>();
 }
 
-void Surface::look_up(const Tile& tile, const RayTable& rays, SurfaceTile& surface) const {
+void Surface::look_up(const Tile& tile, const RayTable& rays, SurfaceTile& surface,
+                      std::span<const PixelMaterial> known) const {
   Lanes<float> spread_rad;
   for (int lane = 0; lane < tile.count; ++lane)
     spread_rad[lane] = rays.pixel_angle_rad[tile.pixel[lane]];
-  look_up(tile, spread_rad, surface);
+  if (known.empty()) return look_up(tile, spread_rad, surface);
+  look_up_shape(tile, spread_rad, surface);
+  std::size_t asked = 0;
+  for (int k = 0; k < surface.count; ++k) {
+    const MaterialQuery& query = surface.query[k];
+    const PixelMaterial& pixel = known[static_cast<std::size_t>(tile.pixel[surface.lane[k]])];
+    const float apart2 = (query.rest_position_mm - pixel.rest_position_mm).squaredNorm();
+    if (pixel.known && apart2 <= query.footprint_mm * query.footprint_mm) {
+      surface.material[k] = pixel.material;
+    } else {
+      surface.asked[asked] = k;
+      surface.asked_query[asked++] = query;
+    }
+  }
+  if (asked == 0) return;
+  material_({surface.asked_query.data(), asked}, {surface.answer.data(), asked});
+  for (std::size_t i = 0; i < asked; ++i) surface.material[surface.asked[i]] = surface.answer[i];
 }
 
 void Surface::look_up(const Tile& tile, const Lanes<float>& spread_rad,
                       SurfaceTile& surface) const {
+  look_up_shape(tile, spread_rad, surface);
+  const auto n = static_cast<std::size_t>(surface.count);
+  if (n > 0) material_({surface.query.data(), n}, {surface.material.data(), n});
+}
+
+void Surface::look_up_shape(const Tile& tile, const Lanes<float>& spread_rad,
+                            SurfaceTile& surface) const {
   surface.count = 0;
   for (int lane = 0; lane < tile.count; ++lane) {
     const Hit& hit = tile.hit[lane];
@@ -84,8 +108,6 @@ void Surface::look_up(const Tile& tile, const Lanes<float>& spread_rad,
     const float cosine = std::max(kLeastCosine, std::abs(normal.dot(direction)));
     query.footprint_mm = static_cast<float>(hit.range_mm) * spread_rad[lane] / std::sqrt(cosine);
   }
-  const auto n = static_cast<std::size_t>(surface.count);
-  if (n > 0) material_({surface.query.data(), n}, {surface.material.data(), n});
 }
 
 }  // namespace rugae

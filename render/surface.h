@@ -15,6 +15,14 @@ using MaterialQuery = MucosaPlace;
 /// Fills one sample a query; called once a tile, from many threads.
 using Material = std::function<void(std::span<const MaterialQuery>, std::span<MucosaSample>)>;
 
+/// The material at a pixel's own point, for rays that meet the wall beside it. It is filtered over
+/// the pixel's footprint, so it is that of every place within it.
+struct PixelMaterial {
+  Vec3f rest_position_mm;
+  MucosaSample material;
+  bool known = false;
+};
+
 /// The wall at the lanes of a tile that met it.
 struct SurfaceTile {
   int count = 0;
@@ -22,6 +30,11 @@ struct SurfaceTile {
   Lanes<Vec3f> shading_normal;  // world axes, facing the camera's side
   Lanes<MaterialQuery> query;
   Lanes<MucosaSample> material;
+
+  // Of the lanes whose material is not known yet.
+  Lanes<int> asked;
+  Lanes<MaterialQuery> asked_query;
+  Lanes<MucosaSample> answer;
 };
 
 class Surface {
@@ -36,8 +49,10 @@ class Surface {
   const TriangleMesh& wall() const { return *wall_; }
   /// Unit geometric normal by the winding, world axes; zero for a triangle without area.
   const Vec3f& geometric_normal(int triangle) const { return triangle_normals_[triangle]; }
-  /// Works out every lane that met the wall.
-  void look_up(const Tile& tile, const RayTable& rays, SurfaceTile& surface) const;
+  /// Works out every lane that met the wall. Where it was met within a footprint of the point that
+  /// `known` has for the pixel, that material is taken; `known` is empty or has one entry a pixel.
+  void look_up(const Tile& tile, const RayTable& rays, SurfaceTile& surface,
+               std::span<const PixelMaterial> known = {}) const;
   /// The same for rays that stand for cones of `spread_rad` (square root of the solid angle), by
   /// lane.
   void look_up(const Tile& tile, const Lanes<float>& spread_rad, SurfaceTile& surface) const;
@@ -48,6 +63,8 @@ class Surface {
     Region region;
   };
   void find_triangle_normals();
+  // All of a SurfaceTile but the materials.
+  void look_up_shape(const Tile& tile, const Lanes<float>& spread_rad, SurfaceTile& surface) const;
   void pack(const std::vector<Vec3>& rest_positions, const std::vector<Region>& regions);
 
   const TriangleMesh* wall_;

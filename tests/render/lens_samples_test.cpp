@@ -214,5 +214,37 @@ TEST(LensSamples, OneAndTwoThreadsGatherTheSame) {
   EXPECT_EQ(std::memcmp(one.data, two.data, one.total() * one.elemSize()), 0);
 }
 
+// The mucosa looked up once a pixel is that looked up for every sample, up to what lies between the
+// points of one footprint.
+TEST(LensSamples, MaterialsOfTheSharpFrameServeTheSamples) {
+  const Scene scene = load_scene({.name_or_path = "stomach", .seed = 1, .resolution = "coarse"});
+  Vec3 inside = Vec3::Zero();
+  int count = 0;
+  for (std::size_t i = 0; i < scene.wall.vertices.size(); ++i)
+    if (scene.regions[i] == Region::body) {
+      inside += scene.wall.vertices[i];
+      ++count;
+    }
+  FrameView view;
+  view.camera = RowPoses(Rigid3(test::random_rotation(2), inside / count));
+  const FrameRenderer renderer(scene, test::small_camera(192, 144), {.keep_materials = true});
+  const CleanFrame sharp = renderer.render(view, nullptr, nullptr);
+  const LensSampling sampling{.samples = 16};
+  const cv::Mat once = renderer.gather(view, sampling, nullptr, sharp.materials),
+                each = renderer.gather(view, sampling);
+  double difference = 0.0, apart = 0.0, whole = 0.0;
+  int same = 0;
+  for (int i = 0; i < 192 * 144; ++i) {
+    const Vec3f a = once.ptr<Vec3f>()[i], b = each.ptr<Vec3f>()[i];
+    difference += a.sum() - b.sum();
+    apart += (a - b).cwiseAbs().sum();
+    whole += b.sum();
+    same += a == b;
+  }
+  EXPECT_LT(same, 1000);                          // it does something
+  EXPECT_LE(std::abs(difference), 5e-4 * whole);  // no lighter, no darker
+  EXPECT_LE(apart, 0.01 * whole);                 // and nowhere far off
+}
+
 }  // namespace
 }  // namespace rugae
