@@ -372,7 +372,8 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
         {.vignetting = options.render.lens.vignetting,
          .labels = options.render.labels,
          .choice = {truth.backward_flow, truth.triangles},
-         .paths = {light.bounces, light.samples, light.roulette, mount.noise_seed}});
+         .paths = {light.bounces, light.samples, light.roulette, mount.noise_seed},
+         .device = options.ray_device});
     const Motion motion(renderer.wall(), scene.motion, path.between,
                         {.frames = frames,
                          .fps = camera.sensor.fps,
