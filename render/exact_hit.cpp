@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace rugae {
 namespace {
@@ -10,13 +11,26 @@ namespace {
 // precision places a hit to about 1e-6 of the distance to the camera (0.1 um at 100 mm), and
 // triangles are wider than 0.1 mm, so rounding moves it by about 1e-3 of a triangle.
 constexpr double kNearEdge = 4e-3;
-// Two hits nearer to each other than this share of the range are one place on a shared edge.
-constexpr double kSamePlace = 1e-12;
+// Triangles to look at within the slack of a grazing ray.
+constexpr std::size_t kMostWithinSlack = 1024;
+
+// Squared distance of the origin from the line between a and b.
+double squared_distance(const Vec2& a, const Vec2& b) {
+  const Vec2 along = b - a;
+  const double length2 = along.squaredNorm();
+  const double share = length2 > 0.0 ? std::clamp(-a.dot(along) / length2, 0.0, 1.0) : 0.0;
+  return (a + share * along).squaredNorm();
+}
+
+bool comes_before(double range_mm, int triangle, const Hit& other) {
+  return !other.met() || range_mm < other.range_mm ||
+         (range_mm == other.range_mm && triangle < other.triangle);
+}
 
 }  // namespace
 
-ExactHit::ExactHit(const TriangleMesh& mesh)
-    : triangles_(&mesh.triangles), vertices_{&mesh.vertices} {
+ExactHit::ExactHit(const TriangleMesh& mesh, double slack_mm)
+    : triangles_(&mesh.triangles), vertices_{&mesh.vertices}, slack_mm_(slack_mm) {
   auto around = std::make_shared<Around>();
   std::vector<int>& first = around->first_of_vertex;
   first.assign(mesh.vertices.size() + 1, 0);
@@ -32,7 +46,10 @@ ExactHit::ExactHit(const TriangleMesh& mesh)
 }
 
 ExactHit::ExactHit(const ExactHit& other, const VertexMotion& vertices)
-    : triangles_(other.triangles_), vertices_(vertices), around_(other.around_) {}
+    : triangles_(other.triangles_),
+      vertices_(vertices),
+      slack_mm_(other.slack_mm_),
+      around_(other.around_) {}
 
 // Corners are sheared into a frame in which the ray is the third axis, and the edge functions are
 // taken of the other two coordinates. A corner's coordinates do not depend on the triangle, and an
@@ -59,6 +76,27 @@ struct ExactHit::Ray {
   }
 };
 
+// Where the ray meets the plane of a triangle, and how it passes the triangle's edges.
+struct ExactHit::Meeting {
+  Vec3 corners[3];  // in the ray's frame
+  double range_mm;
+  double b0, b1, b2;
+
+  // Written so that the not-a-number of a triangle seen edge-on is no hit.
+  bool inside() const { return b0 >= 0.0 && b1 >= 0.0 && b2 >= 0.0 && range_mm > 0.0; }
+  bool within(double distance_mm) const {
+    if (inside()) return true;
+    for (int k = 0; k < 3; ++k)
+      if (squared_distance(corners[k].head<2>(), corners[(k + 1) % 3].head<2>()) <=
+          distance_mm * distance_mm)
+        return true;
+    return false;
+  }
+  Hit as_hit(int triangle) const {
+    return {triangle, range_mm, static_cast<float>(b1), static_cast<float>(b2)};
+  }
+};
+
 ExactHit::Meeting ExactHit::meet(const Ray& ray, int triangle) const {
   const Vec3i& t = (*triangles_)[triangle];
   const Vec3 a = ray(vertices_(t[0], ray.beat)), b = ray(vertices_(t[1], ray.beat)),
@@ -67,50 +105,52 @@ ExactHit::Meeting ExactHit::meet(const Ray& ray, int triangle) const {
                w = b.x() * a.y() - b.y() * a.x();
   const double inverse = 1.0 / (u + v + w);
   const double b0 = u * inverse, b1 = v * inverse, b2 = w * inverse;
-  return {(b0 * a.z() + b1 * b.z() + b2 * c.z()) * ray.along, b0, b1, b2};
+  return {{a, b, c}, (b0 * a.z() + b1 * b.z() + b2 * c.z()) * ray.along, b0, b1, b2};
 }
 
-Hit ExactHit::operator()(const Vec3& origin, const Vec3& direction, double beat, int proposed,
-                         bool strictly) const {
+Hit ExactHit::operator()(const Vec3& origin, const Vec3& direction, double beat,
+                         int proposed) const {
   const Ray ray(origin, direction, beat);
   const Meeting first = meet(ray, proposed);
-  const auto as_hit = [](int triangle, const Meeting& m) {
-    return Hit{triangle, m.range_mm, static_cast<float>(m.b1), static_cast<float>(m.b2)};
-  };
-  if (std::min({first.b0, first.b1, first.b2}) > kNearEdge) return as_hit(proposed, first);
-
-  int best = -1;
-  Meeting best_meeting = first;
-  for (int k = 0; k < 3; ++k) {
-    const int vertex = (*triangles_)[proposed][k];
-    for (int i = around_->first_of_vertex[vertex]; i < around_->first_of_vertex[vertex + 1]; ++i) {
-      const int triangle = around_->triangles_of_vertex[i];
-      const Meeting m = meet(ray, triangle);
-      // Written so that the not-a-number of a triangle seen edge-on is no hit.
-      if (!(m.b0 >= 0.0 && m.b1 >= 0.0 && m.b2 >= 0.0 && m.range_mm > 0.0)) continue;
-      const double slack = kSamePlace * m.range_mm;
-      const bool nearer = best < 0 || m.range_mm < best_meeting.range_mm - slack;
-      const bool tie = best >= 0 && std::abs(m.range_mm - best_meeting.range_mm) <= slack;
-      if (nearer || (tie && triangle < best)) {
-        best = triangle;
-        best_meeting = m;
-      }
-    }
-  }
-  if (best >= 0) return as_hit(best, best_meeting);
-  return strictly ? Hit{} : nearest_on(ray, proposed, first);
+  if (std::min({first.b0, first.b1, first.b2}) > kNearEdge) return first.as_hit(proposed);
+  const Hit hit = nearest_around(ray, proposed);
+  return hit.met() ? hit : nearest_within_slack(ray, proposed);
 }
 
-// The exact ray passes the outline of the wall within the traversal's rounding: the point of the
-// proposed triangle next to it.
-Hit ExactHit::nearest_on(const Ray& ray, int triangle, const Meeting& meeting) const {
-  Vec3 b(meeting.b0, meeting.b1, meeting.b2);
-  b = b.allFinite() ? Vec3(b.cwiseMax(0.0)) : Vec3(1.0, 0.0, 0.0);  // seen edge-on: a corner
-  b /= b.sum();
-  const Vec3i& t = (*triangles_)[triangle];
-  double along = 0.0;
-  for (int k = 0; k < 3; ++k) along += b[k] * ray(vertices_(t[k], ray.beat)).z();
-  return {triangle, along * ray.along, static_cast<float>(b[1]), static_cast<float>(b[2])};
+// The triangle itself, and those that share a corner with it; some of them more than once.
+template <typename Visit>
+void ExactHit::for_each_around(int triangle, const Visit& visit) const {
+  for (int k = 0; k < 3; ++k) {
+    const int vertex = (*triangles_)[triangle][k];
+    for (int i = around_->first_of_vertex[vertex]; i < around_->first_of_vertex[vertex + 1]; ++i)
+      visit(around_->triangles_of_vertex[i]);
+  }
+}
+
+Hit ExactHit::nearest_around(const Ray& ray, int triangle) const {
+  Hit nearest;
+  for_each_around(triangle, [&](int t) {
+    const Meeting m = meet(ray, t);
+    if (m.inside() && comes_before(m.range_mm, t, nearest)) nearest = m.as_hit(t);
+  });
+  return nearest;
+}
+
+// A ray that grazes the wall may run beside it within the slack over many triangles before it meets
+// one. All that hang together with the proposed one are looked at; the ray passes an outline where
+// it meets none.
+Hit ExactHit::nearest_within_slack(const Ray& ray, int triangle) const {
+  constexpr double kSheared = 3.0;  // the ray's frame stretches distances by less
+  Hit nearest;
+  std::vector<int> seen{triangle};
+  for (std::size_t at = 0; at < seen.size() && seen.size() < kMostWithinSlack; ++at)
+    for_each_around(seen[at], [&](int t) {
+      if (std::ranges::find(seen, t) != seen.end()) return;
+      const Meeting m = meet(ray, t);
+      if (m.inside() && comes_before(m.range_mm, t, nearest)) nearest = m.as_hit(t);
+      if (m.within(kSheared * slack_mm_)) seen.push_back(t);
+    });
+  return nearest;
 }
 
 }  // namespace rugae

@@ -18,36 +18,36 @@ struct Hit {
   bool met() const { return triangle >= 0; }
 };
 
-/// Turns a proposed triangle into a hit that does not depend on how it was found: on an edge or a
-/// corner, where the rounding of the traversal decides which of the neighbours is proposed, the
-/// nearest of the triangles that the ray truly meets is taken, and of equally near ones the one of
-/// the lowest index.
+/// Turns a proposed triangle into a hit that does not depend on how it was found: where the
+/// rounding of the traversal decides which of several triangles is proposed, the nearest of those
+/// that the ray truly meets is taken, and of equally near ones the one of the lowest index. A
+/// proposal beside which the ray passes is no hit.
 class ExactHit {
  public:
-  explicit ExactHit(const TriangleMesh& mesh);  // keeps a reference: the mesh must outlive it
+  /// Keeps a reference: the mesh must outlive it. Proposals may lie beside the ray by `slack_mm`.
+  ExactHit(const TriangleMesh& mesh, double slack_mm);
   /// The triangles of `other` with vertices that are elsewhere or move.
   ExactHit(const ExactHit& other, const VertexMotion& vertices);
 
-  /// The hit of the ray origin + t direction (unit), sent at `beat`, at the proposed triangle or a
-  /// neighbour. Where the exact ray misses all of them, past an outline: the next point of the
-  /// proposed triangle, or no hit when `strictly`.
-  Hit operator()(const Vec3& origin, const Vec3& direction, double beat, int proposed,
-                 bool strictly = false) const;
+  /// The hit of the ray origin + t direction, sent at `beat`, at the proposed triangle or near it;
+  /// none where the ray passes an outline there. The range is t: mm for a unit direction.
+  Hit operator()(const Vec3& origin, const Vec3& direction, double beat, int proposed) const;
 
  private:
   struct Ray;
-  struct Meeting {
-    double range_mm;
-    double b0, b1, b2;
-  };
+  struct Meeting;
   struct Around {  // the triangles around a vertex
     std::vector<int> first_of_vertex, triangles_of_vertex;
   };
   Meeting meet(const Ray& ray, int triangle) const;
-  Hit nearest_on(const Ray& ray, int triangle, const Meeting& meeting) const;
+  template <typename Visit>
+  void for_each_around(int triangle, const Visit& visit) const;
+  Hit nearest_around(const Ray& ray, int triangle) const;
+  Hit nearest_within_slack(const Ray& ray, int triangle) const;
 
   const std::vector<Vec3i>* triangles_;
   VertexMotion vertices_;
+  double slack_mm_;
   std::shared_ptr<const Around> around_;
 };
 

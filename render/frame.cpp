@@ -67,7 +67,7 @@ FrameRenderer::FrameRenderer(const Scene& scene, const Camera& camera, const Ren
     : FrameRenderer(Surface(scene), camera, options) {}
 
 FrameRenderer::FrameRenderer(Surface surface, const Camera& camera, const RenderOptions& options)
-    : wall_(std::move(surface)),
+    : wall_(std::move(surface), options.device),
       camera_(camera),
       options_(options),
       rays_(make_ray_table(camera.lens, camera.vignetting)),

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <opencv2/core/mat.hpp>
+#include <string>
 
 #include "dataset/truth.h"
 #include "render/labels.h"
@@ -23,6 +24,7 @@ struct RenderOptions {
   LabelSet labels = {};
   PathOptions paths = {};       // of light that comes over other walls
   bool keep_materials = false;  // for gather
+  std::string device = {};      // the Raycaster's; no result depends on it
 };
 
 struct CleanFrame {

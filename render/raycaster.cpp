@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <mutex>
 
@@ -68,45 +69,67 @@ void set_ray(Ray& ray, int lane, const Vec3& origin, const Vec3& direction, doub
   ray.flags[lane] = 0;
 }
 
-// Even the robust traversal lets a ray slip through a corner at times. Rays a little beside it
-// propose the triangles around the corner; the exact ray decides.
-Hit beside(RTCScene scene, const ExactHit& exact, const Eye& eye, const Vec3& local_origin,
-           const Vec3& direction) {
+// The traversal computes in single precision, each instruction set in its own way: near an outline
+// some propose the fold and some the wall behind it. So it is given walls that are thicker by
+// somewhat more than its rounding (on the side of the lumen, against the winding's normals): it
+// proposes every fold that the exact ray meets, and some that the exact ray passes, which are
+// refused.
+constexpr double kSwell = 1e-6;  // of the wall's diameter: 16 roundings
+
+// What a ray is traced against.
+struct Target {
+  RTCScene scene;
+  const ExactHit& exact;
+  const Vec3& center;
+};
+
+// The nearest triangle that the traversal finds on a ray beyond t_near, and where; -1 for none.
+struct Proposal {
+  int triangle;
+  float t;
+};
+Proposal propose(const Target& target, const Eye& eye, const Vec3& direction, float t_near,
+                 float t_far) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  const Vec3f origin = (eye.position_mm - target.center).cast<float>(), d = direction.cast<float>();
+  RTCRayHit ray{};
+  ray.ray = {origin.x(), origin.y(), origin.z(), t_near,
+             d.x(),      d.y(),      d.z(),      library_time(eye.beat),
+             t_far,      ~0u,        0,          0};
+  ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(target.scene, &context, &ray);
+  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {-1, 0.0f};
+  return {static_cast<int>(ray.hit.primID), ray.ray.tfar};
+}
+
+// For the few rays whose first proposal is none: one by one through all that the traversal
+// proposes along the ray. Even its robust mode lets a ray slip through a corner at times; then rays
+// a little beside it propose the triangles around the corner. The exact ray decides.
+Hit search(const Target& target, const Eye& eye, const Vec3& direction, double t_far) {
+  constexpr int kMostProposals = 256;
   constexpr double kBeside = 4e-6;  // rad: some roundings of single precision
-  const Vec3 across = direction.unitOrthogonal();
-  for (double side : {kBeside, -kBeside}) {
-    const Vec3 d = direction + side * across;
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    RTCRayHit ray{};
-    ray.ray = {static_cast<float>(local_origin.x()),
-               static_cast<float>(local_origin.y()),
-               static_cast<float>(local_origin.z()),
-               0.0f,
-               static_cast<float>(d.x()),
-               static_cast<float>(d.y()),
-               static_cast<float>(d.z()),
-               library_time(eye.beat),
-               std::numeric_limits<float>::infinity(),
-               ~0u,
-               0,
-               0};
-    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(scene, &context, &ray);
-    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
-    const Hit hit =
-        exact(eye.position_mm, direction, eye.beat, static_cast<int>(ray.hit.primID), true);
-    if (hit.met()) return hit;
+  const Vec3 across = direction.norm() * direction.unitOrthogonal();
+  for (const double side : {0.0, kBeside, -kBeside}) {
+    float t_near = 0.0f;
+    for (int i = 0; i < kMostProposals; ++i) {
+      const Proposal proposal =
+          propose(target, eye, direction + side * across, t_near, static_cast<float>(t_far));
+      if (proposal.triangle < 0) break;
+      const Hit hit = target.exact(eye.position_mm, direction, eye.beat, proposal.triangle);
+      if (hit.met()) return hit;
+      t_near = std::nextafter(std::max(t_near, proposal.t), std::numeric_limits<float>::infinity());
+    }
   }
   return {};
 }
 
 template <int N>
-void intersect_packets(RTCScene scene, const ExactHit& exact, const Vec3& center,
-                       std::span<const Eye> eyes, std::span<const Vec3> directions,
-                       std::span<Hit> hits) {
+void intersect_packets(const Target& target, std::span<const Eye> eyes,
+                       std::span<const Vec3> directions, std::span<Hit> hits) {
   RTCIntersectContext context = coherent_context();
+  constexpr double kFar = std::numeric_limits<double>::infinity();
   for (std::size_t begin = 0; begin < directions.size(); begin += N) {
     const int count = static_cast<int>(std::min<std::size_t>(N, directions.size() - begin));
     alignas(64) typename Packet<N>::RayHit packet;
@@ -116,29 +139,29 @@ void intersect_packets(RTCScene scene, const ExactHit& exact, const Vec3& center
       const Vec3 direction = lane < count ? directions[i] : Vec3::Zero();
       const Eye& eye = eye_of(eyes, i);
       active[lane] = direction.squaredNorm() > 0.0 ? -1 : 0;
-      set_ray(packet.ray, lane, eye.position_mm - center, active[lane] ? direction : Vec3::UnitZ(),
-              std::numeric_limits<float>::infinity(), eye.beat);
+      set_ray(packet.ray, lane, eye.position_mm - target.center,
+              active[lane] ? direction : Vec3::UnitZ(), kFar, eye.beat);
       packet.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
       packet.hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
     }
-    Packet<N>::intersect(active, scene, &context, &packet);
+    Packet<N>::intersect(active, target.scene, &context, &packet);
     for (int lane = 0; lane < count; ++lane) {
       Hit& hit = hits[begin + lane];
+      hit = {};
+      if (!active[lane]) continue;
       const Vec3& direction = directions[begin + lane];
       const Eye& eye = eye_of(eyes, begin + lane);
-      if (!active[lane])
-        hit = {};
-      else if (packet.hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID)
-        hit = beside(scene, exact, eye, eye.position_mm - center, direction);
-      else
-        hit =
-            exact(eye.position_mm, direction, eye.beat, static_cast<int>(packet.hit.primID[lane]));
+      if (packet.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID)
+        hit = target.exact(eye.position_mm, direction, eye.beat,
+                           static_cast<int>(packet.hit.primID[lane]));
+      if (!hit.met()) hit = search(target, eye, direction, kFar);
     }
   }
 }
 
+// The slack makes the traversal's no certain; where it says yes, the exact ray decides.
 template <int N>
-void occlusion_packets(RTCScene scene, const Vec3& center, std::span<const Eye> eyes,
+void occlusion_packets(const Target& target, std::span<const Eye> eyes,
                        std::span<const Vec3> points, std::span<const std::uint8_t> wanted,
                        std::span<std::uint8_t> hidden) {
   RTCIntersectContext context = coherent_context();
@@ -153,13 +176,19 @@ void occlusion_packets(RTCScene scene, const Vec3& center, std::span<const Eye> 
       active[lane] = lane < count && wanted[i] ? -1 : 0;
       any = any || active[lane];
       // The direction keeps its length, so the ray's parameter is the share of the distance.
-      set_ray(packet, lane, eye.position_mm - center,
+      set_ray(packet, lane, eye.position_mm - target.center,
               active[lane] ? Vec3(points[i] - eye.position_mm) : Vec3::UnitZ(), Raycaster::kReach,
               eye.beat);
     }
-    if (any) Packet<N>::occluded(active, scene, &context, &packet);
-    for (int lane = 0; lane < count; ++lane)
-      hidden[begin + lane] = active[lane] && packet.tfar[lane] < 0.0f;
+    if (any) Packet<N>::occluded(active, target.scene, &context, &packet);
+    for (int lane = 0; lane < count; ++lane) {
+      const std::size_t i = begin + lane;
+      hidden[i] = 0;
+      if (!(active[lane] && packet.tfar[lane] < 0.0f)) continue;
+      const Eye& eye = eye_of(eyes, i);
+      const Hit hit = search(target, eye, points[i] - eye.position_mm, Raycaster::kReach);
+      hidden[i] = hit.met() && hit.range_mm < Raycaster::kReach;
+    }
   }
 }
 
@@ -172,12 +201,28 @@ struct Hierarchy {
   unsigned steps = 1;
 };
 
+std::vector<Vec3f> swelling(const std::vector<Vec3>& vertices, const std::vector<Vec3i>& triangles,
+                            double swell_mm) {
+  std::vector<Vec3f> swell(vertices.size(), Vec3f::Zero());
+  for (const Vec3i& t : triangles) {
+    const Vec3& a = vertices[t[0]];
+    const Vec3f out = (vertices[t[1]] - a).cross(vertices[t[2]] - a).cast<float>();
+    for (int k = 0; k < 3; ++k) swell[t[k]] -= out;
+  }
+  for (Vec3f& s : swell) {
+    const float norm = s.norm();
+    s *= norm > 0.0f ? static_cast<float>(swell_mm) / norm : 0.0f;
+  }
+  return swell;
+}
+
 void set_vertices(const Hierarchy& h, const std::array<const std::vector<Vec3>*, 3>& lists,
-                  const Vec3& center) {
+                  const std::vector<Vec3f>& swell, const Vec3& center) {
   for (unsigned step = 0; step < h.steps; ++step) {
     float* out = h.vertices[step];
-    for (const Vec3& v : *lists[step])
-      for (int k = 0; k < 3; ++k) *out++ = static_cast<float>(v[k] - center[k]);
+    for (std::size_t v = 0; v < lists[step]->size(); ++v)
+      for (int k = 0; k < 3; ++k)
+        *out++ = static_cast<float>((*lists[step])[v][k] - center[k] + swell[v][k]);
   }
 }
 
@@ -197,6 +242,7 @@ void commit(const Hierarchy& h, std::size_t triangles, RTCDevice device) {
 // What is shared by all that was made from one mesh at rest.
 struct Raycaster::Shared {
   Vec3 center;  // of the bounding box: single precision is finest around zero
+  double swell_mm;
   std::size_t vertex_count;
   const std::vector<Vec3i>* triangles;
   RTCDevice device = nullptr;
@@ -206,6 +252,7 @@ struct Raycaster::Shared {
 
   explicit Shared(const TriangleMesh& m)
       : center(bounding_box(m).center()),
+        swell_mm(kSwell * bounding_box(m).diagonal().norm()),
         vertex_count(m.vertices.size()),
         triangles(&m.triangles) {}
   ~Shared() {
@@ -263,8 +310,9 @@ struct Raycaster::State {
 
 Raycaster::Raycaster(const TriangleMesh& mesh, const std::string& device) {
   check_mesh(mesh, "raycaster");
-  state_ = std::make_unique<State>(State{std::make_shared<Shared>(mesh), ExactHit(mesh), {}});
-  Shared& shared = *state_->shared;
+  auto made = std::make_shared<Shared>(mesh);
+  Shared& shared = *made;
+  state_ = std::make_unique<State>(State{std::move(made), ExactHit(mesh, shared.swell_mm), {}});
   shared.device = rtcNewDevice(device.c_str());
   check(shared.device != nullptr, "ray tracing: no device for '{}' (error {})", device,
         static_cast<int>(rtcGetDeviceError(nullptr)));
@@ -273,7 +321,8 @@ Raycaster::Raycaster(const TriangleMesh& mesh, const std::string& device) {
   else if (rtcGetDeviceProperty(shared.device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED))
     shared.packet_size = 8;
   state_->hierarchy = shared.make(1, false);
-  set_vertices(state_->hierarchy, {&mesh.vertices}, shared.center);
+  set_vertices(state_->hierarchy, {&mesh.vertices},
+               swelling(mesh.vertices, mesh.triangles, shared.swell_mm), shared.center);
   commit(state_->hierarchy, mesh.triangles.size(), shared.device);
 }
 
@@ -294,10 +343,11 @@ Raycaster::Raycaster(const Raycaster& rest, const VertexMotion& vertices)
     }
   }
   if (!h.scene) h = shared.make(steps, true);
+  const std::vector<Vec3f> swell = swelling(*vertices.now, *shared.triangles, shared.swell_mm);
   if (steps == 1)
-    set_vertices(h, {vertices.now}, shared.center);
+    set_vertices(h, {vertices.now}, swell, shared.center);
   else
-    set_vertices(h, {vertices.before, vertices.now, vertices.after}, shared.center);
+    set_vertices(h, {vertices.before, vertices.now, vertices.after}, swell, shared.center);
   for (unsigned step = 0; step < steps; ++step)
     rtcUpdateGeometryBuffer(h.geometry, RTC_BUFFER_TYPE_VERTEX, step);
   commit(h, shared.triangles->size(), shared.device);
@@ -312,14 +362,13 @@ void Raycaster::intersect(std::span<const Eye> eyes, std::span<const Vec3> direc
                           std::span<Hit> hits) const {
   check(hits.size() == directions.size() && (eyes.size() == 1 || eyes.size() == directions.size()),
         "raycaster: {} eyes and {} hits for {} rays", eyes.size(), hits.size(), directions.size());
-  const Vec3& center = state_->shared->center;
-  const RTCScene scene = state_->hierarchy.scene;
+  const Target target{state_->hierarchy.scene, state_->exact, state_->shared->center};
   if (packet_size() == 16)
-    intersect_packets<16>(scene, state_->exact, center, eyes, directions, hits);
+    intersect_packets<16>(target, eyes, directions, hits);
   else if (packet_size() == 8)
-    intersect_packets<8>(scene, state_->exact, center, eyes, directions, hits);
+    intersect_packets<8>(target, eyes, directions, hits);
   else
-    intersect_packets<4>(scene, state_->exact, center, eyes, directions, hits);
+    intersect_packets<4>(target, eyes, directions, hits);
 }
 
 void Raycaster::intersect(const Vec3& origin, std::span<const Vec3> directions,
@@ -341,14 +390,13 @@ void Raycaster::hidden_from(std::span<const Eye> eyes, std::span<const Vec3> poi
             (eyes.size() == 1 || eyes.size() == points.size()),
         "raycaster: {} eyes, {} flags and {} answers for {} points", eyes.size(), wanted.size(),
         hidden.size(), points.size());
-  const Vec3& center = state_->shared->center;
-  const RTCScene scene = state_->hierarchy.scene;
+  const Target target{state_->hierarchy.scene, state_->exact, state_->shared->center};
   if (packet_size() == 16)
-    occlusion_packets<16>(scene, center, eyes, points, wanted, hidden);
+    occlusion_packets<16>(target, eyes, points, wanted, hidden);
   else if (packet_size() == 8)
-    occlusion_packets<8>(scene, center, eyes, points, wanted, hidden);
+    occlusion_packets<8>(target, eyes, points, wanted, hidden);
   else
-    occlusion_packets<4>(scene, center, eyes, points, wanted, hidden);
+    occlusion_packets<4>(target, eyes, points, wanted, hidden);
 }
 
 void Raycaster::hidden_from(const Vec3& eye, std::span<const Vec3> points,

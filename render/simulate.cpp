@@ -372,7 +372,8 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
         {.vignetting = options.render.lens.vignetting,
          .labels = options.render.wanted_labels(),
          .paths = {light.bounces, light.samples, light.roulette, mount.noise_seed},
-         .keep_materials = options.render.lens.samples > 1});
+         .keep_materials = options.render.lens.samples > 1,
+         .device = options.ray_device});
     const Motion motion(renderer.wall(), scene.motion, path.between,
                         {.frames = frames,
                          .fps = camera.sensor.fps,

@@ -21,6 +21,9 @@ struct SimulateOptions {
   std::uint64_t seed = 1;
   int threads = 0;  // 0: all
   RenderSettings render;
+  /// For the ray tracing library, such as "isa=avx2" to restrict its instruction set. No result
+  /// depends on it, so it stands in no file and no command line.
+  std::string ray_device;
   /// Throws Error naming the field.
   void check() const;
 };

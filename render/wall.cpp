@@ -15,10 +15,10 @@ TriangleMesh mesh_at(const TriangleMesh& rest, const std::vector<Vec3>& vertices
 
 }  // namespace
 
-Wall::Wall(Surface surface)
+Wall::Wall(Surface surface, const std::string& device)
     : vertices_{&surface.wall().vertices},
       surface_(std::move(surface)),
-      raycaster_(surface_.wall()) {}
+      raycaster_(surface_.wall(), device) {}
 
 Wall::Wall(const Wall& rest, Positions now, Positions before, Positions after)
     : moved_(mesh_at(rest.surface_.wall(), *now)),

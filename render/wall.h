@@ -2,6 +2,7 @@
 // The wall around one frame's time: what rays meet, how it looks there, and where its points go.
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "render/raycaster.h"
@@ -13,8 +14,8 @@ using Positions = std::shared_ptr<const std::vector<Vec3>>;  // of the vertices,
 
 class Wall {
  public:
-  /// Keeps still.
-  explicit Wall(Surface surface);
+  /// Keeps still. `device` is the Raycaster's; no result depends on it.
+  explicit Wall(Surface surface, const std::string& device = {});
   /// The wall of `rest` (which must outlive it) with its vertices elsewhere. Between the moments
   /// `before`, `now` and `after`, a beat apart, they move as VertexMotion says; without the first
   /// and the last they stay at `now`. Normals for shading are those of `now`.

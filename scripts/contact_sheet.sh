@@ -29,7 +29,7 @@ frame "mucus, bubbles, debris" 200 --scene stomach-unclean
 frame "lesions" 200 --scene stomach-lesions
 for index in 180 360 540; do frame "moving wall, $((index / 30)) s" "$index" --scene stomach-moving --trajectory 2; done
 
-frame "all labels" 200 --scene stomach-lesions --set truth.backward_flow=true truth.triangles=true
+frame "all labels" 200 --scene stomach-lesions --all-labels --set light.bounces=1 light.samples=64
 build/release/apps/rugae picture "$out/data" --frame 200 --labels --out "$out/labels.png"
 build/release/apps/rugae picture "${pictures[@]::${#pictures[@]}-1}" --columns 4 --out "$out/contact_sheet.png"
 rm -rf "$out/data"

@@ -149,6 +149,22 @@ TEST(Raycaster, HiddenPointsAreThoseBehindOtherWall) {
   EXPECT_LT(found, 1400);
 }
 
+// The traversal's wall is somewhat thicker: a ray that grazes it comes to that one many triangles
+// before the true one.
+TEST(Raycaster, GrazingRaysMeetTheWallWhereItIs) {
+  const TriangleMesh plane = test::plane_mesh(5.0, 8.0, 320);  // at z = 5 mm, 0.05 mm wide cells
+  const Raycaster raycaster(plane);
+  for (int i = 0; i < 200; ++i) {
+    const Vec3 at(2.0 + 0.003 * i, 0.017 * i - 1.5, 5.0);
+    for (const double sine : {1e-3, 1e-4, 2e-5}) {
+      const Vec3 ray = Vec3(1.0, 0.1, sine).normalized();
+      const Hit hit = raycaster.intersect(at - 5.0 * ray, ray);
+      ASSERT_TRUE(hit.met()) << i << ' ' << sine;
+      EXPECT_NEAR(hit.range_mm, 5.0, 1e-9) << sine;
+    }
+  }
+}
+
 TEST(Raycaster, MissesAndZeroDirectionsMeetNothing) {
   const TriangleMesh plane = test::plane_mesh(10.0, 5.0, 2);
   const Raycaster raycaster(plane);
