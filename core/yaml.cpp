@@ -74,6 +74,7 @@ YamlReader::YamlReader(const YAML::Node& node, std::string name)
 
 YamlReader::~YamlReader() = default;
 YamlReader::YamlReader(YamlReader&&) noexcept = default;
+YamlReader& YamlReader::operator=(YamlReader&&) noexcept = default;
 YamlReader::YamlReader(const YamlReader& other) : state_(std::make_unique<State>(*other.state_)) {}
 
 YamlReader YamlReader::from_file(const std::filesystem::path& file) {

@@ -31,6 +31,7 @@ class YamlReader {
   static YamlReader from_text(const std::string& text, const std::string& name);
   ~YamlReader();
   YamlReader(YamlReader&&) noexcept;
+  YamlReader& operator=(YamlReader&&) noexcept;
   YamlReader(const YamlReader&);
 
   bool has(const std::string& key) const;

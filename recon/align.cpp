@@ -34,6 +34,16 @@ struct Match {
   int point = -1;  // its place in the list of points
 };
 
+// CV_8U: a patch around the pixel has no part of what a field stop made black, whose edge stands
+// still. Where the image ends a patch is cut off.
+cv::Mat patch_inside(const cv::Mat& valid, double radius_px) {
+  const int side = 2 * static_cast<int>(std::ceil(radius_px)) + 1;
+  cv::Mat inside;
+  cv::erode(valid, inside, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}), {-1, -1}, 1,
+            cv::BORDER_CONSTANT, cv::Scalar(255));
+  return inside;
+}
+
 // CV_8U: wall whose look belongs to it, a pixel away from reflections and from the field's border.
 cv::Mat usable_pixels(const Frame& frame) {
   cv::Mat usable = frame.valid & ~frame.reflection;
@@ -108,10 +118,14 @@ std::vector<Match> match(const Frame& reference, const Frame& moving, const Alig
   const cv::Mat ref = shrunk(reference.gray), mov = shrunk(moving.gray);
   cv::Mat initial;
   if (!guess.flow.empty()) initial = shrunk(guess.flow) / shrink;
-  const cv::Mat forward = farneback_flow(ref, mov, initial);
-  const cv::Mat backward = farneback_flow(mov, ref, initial.empty() ? initial : cv::Mat(-forward));
+  const cv::Mat seen = shrunk(reference.valid & moving.valid) == 255;
+  const cv::Mat forward = farneback_flow(ref, mov, initial, seen);
+  const cv::Mat backward =
+      farneback_flow(mov, ref, initial.empty() ? initial : cv::Mat(-forward), seen);
 
-  const cv::Mat usable = usable_pixels(reference);
+  const double radius_px = options.patch_radius_px * scale;
+  const cv::Mat usable = usable_pixels(reference) & patch_inside(reference.valid, radius_px),
+                landing = patch_inside(moving.valid, radius_px);
   const int cell_px = std::max(2, static_cast<int>(std::lround(options.grid_px * scale)));
   const std::vector<Vec2> points = guess.reference_points.empty()
                                        ? grid_points(reference, usable, cell_px)
@@ -121,7 +135,7 @@ std::vector<Match> match(const Frame& reference, const Frame& moving, const Alig
     const Vec2& p = points[i];
     if (!mask_at(usable, p)) continue;
     const Vec2 q = p + shrink * sample_flow(forward, p / shrink);
-    if (!mask_at(moving.valid, q)) continue;
+    if (!mask_at(landing, q)) continue;
     const Vec2 back = q + shrink * sample_flow(backward, q / shrink);
     if (!((back - p).norm() <= kRoundTripPx * scale)) continue;
     Mat2 linear = Mat2::Identity();

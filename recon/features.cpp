@@ -21,34 +21,51 @@ constexpr float kRatio = 0.8F;  // Lowe's, IJCV 2004
 constexpr int kMaxPoints = 2000;
 constexpr int kHogSidePx = 32;
 constexpr std::size_t kMinMatches = 4;  // fix a homography
+constexpr int kStopPx = 16;             // so near to a field stop its edge is in the description
 
 struct Described {
   std::vector<cv::Point2f> points;  // integer centres
   cv::Mat descriptors;              // a row each
 };
 
-std::vector<cv::Point2f> corners(const cv::Mat& image) {
+// What is not near the stop; empty: everywhere.
+cv::Mat inside(const cv::Mat& valid) {
+  cv::Mat inner;
+  if (valid.empty()) return inner;
+  cv::erode(valid, inner, cv::Mat::ones(2 * kStopPx + 1, 2 * kStopPx + 1, CV_8U), {-1, -1}, 1,
+            cv::BORDER_CONSTANT, cv::Scalar(255));
+  return inner;
+}
+
+bool is_inside(const cv::Mat& inner, const Vec2& p) {
+  if (inner.empty()) return true;
+  return p.x() >= 0.0 && p.y() >= 0.0 && p.x() < inner.cols && p.y() < inner.rows &&
+         inner.at<unsigned char>(static_cast<int>(p.y()), static_cast<int>(p.x())) != 0;
+}
+
+std::vector<cv::Point2f> corners(const cv::Mat& image, const cv::Mat& inner) {
   std::vector<cv::Point2f> points;
-  cv::goodFeaturesToTrack(image, points, kMaxPoints, 0.005, 7.0);
+  cv::goodFeaturesToTrack(image, points, kMaxPoints, 0.005, 7.0, inner);
   return points;
 }
 
-Described describe(const cv::Ptr<cv::Feature2D>& feature, const cv::Mat& image) {
+Described describe(const cv::Ptr<cv::Feature2D>& feature, const cv::Mat& image,
+                   const cv::Mat& inner) {
   Described d;
   std::vector<cv::KeyPoint> keypoints;
-  feature->detectAndCompute(image, cv::noArray(), keypoints, d.descriptors);
+  feature->detectAndCompute(image, inner, keypoints, d.descriptors);
   cv::KeyPoint::convert(keypoints, d.points);
   return d;
 }
 
 // Histograms of oriented gradients (Dalal and Triggs, CVPR 2005, doi:10.1109/CVPR.2005.177) of the
 // window around each corner.
-Described describe_hog(const cv::Mat& image) {
+Described describe_hog(const cv::Mat& image, const cv::Mat& inner) {
   const cv::HOGDescriptor hog({kHogSidePx, kHogSidePx}, {16, 16}, {8, 8}, {8, 8}, 9);
   Described d;
   const float half = 0.5F * kHogSidePx;
   std::vector<cv::Point> corner_of_window;
-  for (const cv::Point2f& p : corners(image)) {
+  for (const cv::Point2f& p : corners(image, inner)) {
     const cv::Point at(cvRound(p.x - half), cvRound(p.y - half));
     if (at.x < 0 || at.y < 0 || at.x + kHogSidePx > image.cols || at.y + kHogSidePx > image.rows)
       continue;
@@ -62,9 +79,10 @@ Described describe_hog(const cv::Mat& image) {
   return d;
 }
 
-Described describe_surf(const cv::Mat& image) {
+Described describe_surf(const cv::Mat& image, const cv::Mat& inner) {
   Described d;
   for (const SurfPoint& s : surf_points(image, kMaxPoints)) {
+    if (!is_inside(inner, s.pixel)) continue;
     d.points.emplace_back(static_cast<float>(s.pixel.x() - 0.5),
                           static_cast<float>(s.pixel.y() - 0.5));
     d.descriptors.push_back(cv::Mat(s.descriptor, true).reshape(1, 1));
@@ -72,16 +90,16 @@ Described describe_surf(const cv::Mat& image) {
   return d;
 }
 
-Described describe(FeatureMethod method, const cv::Mat& image) {
+Described describe(FeatureMethod method, const cv::Mat& image, const cv::Mat& inner) {
   switch (method) {
     case FeatureMethod::sift:
-      return describe(cv::SIFT::create(kMaxPoints), image);
+      return describe(cv::SIFT::create(kMaxPoints), image, inner);
     case FeatureMethod::orb:
-      return describe(cv::ORB::create(kMaxPoints), image);
+      return describe(cv::ORB::create(kMaxPoints), image, inner);
     case FeatureMethod::surf:
-      return describe_surf(image);
+      return describe_surf(image, inner);
     default:
-      return describe_hog(image);
+      return describe_hog(image, inner);
   }
 }
 
@@ -102,15 +120,18 @@ void add(FeatureMatches& matches, const cv::Point2f& a, const cv::Point2f& b) {
   matches.second_px.emplace_back(b.x + 0.5, b.y + 0.5);
 }
 
-FeatureMatches match_flow(FeatureMethod method, const cv::Mat& first, const cv::Mat& second) {
+FeatureMatches match_flow(FeatureMethod method, const cv::Mat& first, const cv::Mat& second,
+                          const cv::Mat& valid) {
   FeatureMatches matches;
-  const std::vector<cv::Point2f> points = corners(first);
+  const cv::Mat inner = inside(valid);
+  const std::vector<cv::Point2f> points = corners(first, inner);
   if (points.empty()) return matches;
   if (method == FeatureMethod::farneback) {
-    const cv::Mat flow = farneback_flow(first, second);
+    const cv::Mat flow = farneback_flow(first, second, {}, valid);
     for (const cv::Point2f& p : points) {
       const cv::Vec2f f = flow.at<cv::Vec2f>(cvRound(p.y), cvRound(p.x));
-      add(matches, p, p + cv::Point2f(f[0], f[1]));
+      const cv::Point2f q = p + cv::Point2f(f[0], f[1]);
+      if (is_inside(inner, Vec2(q.x + 0.5, q.y + 0.5))) add(matches, p, q);
     }
     return matches;
   }
@@ -118,7 +139,8 @@ FeatureMatches match_flow(FeatureMethod method, const cv::Mat& first, const cv::
   std::vector<unsigned char> found;
   cv::calcOpticalFlowPyrLK(first, second, points, there, found, cv::noArray(), {21, 21}, 4);
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (found[i]) add(matches, points[i], there[i]);
+    if (found[i] && is_inside(inner, Vec2(there[i].x + 0.5, there[i].y + 0.5)))
+      add(matches, points[i], there[i]);
   return matches;
 }
 
@@ -148,14 +170,16 @@ std::string name_of(FeatureMethod method) {
   fail("feature method {}: not known", static_cast<int>(method));
 }
 
-FeatureMatches match_features(FeatureMethod method, const cv::Mat& first, const cv::Mat& second) {
+FeatureMatches match_features(FeatureMethod method, const cv::Mat& first, const cv::Mat& second,
+                              const cv::Mat& valid) {
   check(first.type() == CV_8U && second.type() == CV_8U && first.size() == second.size(),
         "features: expected two 8-bit gray images of one size, found {} x {} and {} x {}",
         first.cols, first.rows, second.cols, second.rows);
   if (method == FeatureMethod::farneback || method == FeatureMethod::lucas_kanade)
-    return match_flow(method, first, second);
+    return match_flow(method, first, second, valid);
   FeatureMatches matches;
-  const Described a = describe(method, first), b = describe(method, second);
+  const cv::Mat inner = inside(valid);
+  const Described a = describe(method, first, inner), b = describe(method, second, inner);
   if (a.descriptors.rows < 2 || b.descriptors.rows < 2) return matches;
   const int norm = method == FeatureMethod::orb ? cv::NORM_HAMMING : cv::NORM_L2;
   const std::vector<int> forward = nearest(a.descriptors, b.descriptors, norm);
@@ -169,10 +193,11 @@ FeatureMatches match_features(FeatureMethod method, const cv::Mat& first, const 
 }
 
 FeatureScore evaluate_feature(FeatureMethod method, const cv::Mat& first, const cv::Mat& second,
-                              std::uint64_t seed, double ransac_threshold_px) {
+                              std::uint64_t seed, double ransac_threshold_px,
+                              const cv::Mat& valid) {
   FeatureScore score;
   const double start = cpu_seconds();
-  const FeatureMatches matches = match_features(method, first, second);
+  const FeatureMatches matches = match_features(method, first, second, valid);
   score.cpu_s = cpu_seconds() - start;
   score.matches = static_cast<int>(matches.first_px.size());
   if (matches.first_px.size() < kMinMatches) return score;

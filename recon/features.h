@@ -24,8 +24,11 @@ struct FeatureMatches {
 
 /// Step 1: matches between two CV_8U images of one size. Descriptors (SIFT, SURF by dlib, ORB, HOG
 /// at corners) are matched by nearest neighbour with Lowe's ratio test (0.8) both ways; the flows
-/// are sampled at the corners (Shi and Tomasi) of the first image.
-FeatureMatches match_features(FeatureMethod method, const cv::Mat& first, const cv::Mat& second);
+/// are sampled at the corners (Shi and Tomasi) of the first image. Points near or beyond the border
+/// of `valid` (CV_8U, of both images; empty: everywhere) are left out: the edge of a field stop is
+/// where it was in every image.
+FeatureMatches match_features(FeatureMethod method, const cv::Mat& first, const cv::Mat& second,
+                              const cv::Mat& valid = {});
 
 struct FeatureScore {
   int matches = 0, inliers = 0;
@@ -38,6 +41,7 @@ struct FeatureScore {
 /// Steps 2 to 4. Only inliers count, as in the paper's table: a method with few matches may still
 /// have a small error, so look at the counts as well.
 FeatureScore evaluate_feature(FeatureMethod method, const cv::Mat& first, const cv::Mat& second,
-                              std::uint64_t seed, double ransac_threshold_px = 3.0);
+                              std::uint64_t seed, double ransac_threshold_px = 3.0,
+                              const cv::Mat& valid = {});
 
 }  // namespace rugae

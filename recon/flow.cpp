@@ -49,23 +49,35 @@ Scores supported(const Scores& scores, int columns, int rows) {
 
 }  // namespace
 
-cv::Mat even_light(const cv::Mat& gray) {
+cv::Mat even_light(const cv::Mat& gray, const cv::Mat& valid) {
   constexpr double kContrast = 40.0, kMiddle = 128.0;  // of the 8-bit result
   constexpr double kFloor = 1.0;  // grey levels: below, noise would be blown up
   const double sigma = std::max(2.0, kLightShare * gray.cols);
-  cv::Mat value, mean, deviation;
+  const bool everywhere = valid.empty() || cv::countNonZero(valid == 0) == 0;
+  cv::Mat share;  // of a pixel's surroundings that is valid
+  if (!everywhere) {
+    cv::Mat(valid != 0).convertTo(share, CV_32F, 1.0 / 255.0);
+    cv::GaussianBlur(share, share, {}, sigma);
+    cv::max(share, 1e-3, share);
+  }
+  const auto mean_of = [&](const cv::Mat& values) {
+    cv::Mat mean;
+    cv::GaussianBlur(values, mean, {}, sigma);
+    return everywhere ? mean : cv::Mat(mean / share);
+  };
+  cv::Mat value, deviation;
   gray.convertTo(value, CV_32F);
-  cv::GaussianBlur(value, mean, {}, sigma);
-  value -= mean;
-  cv::GaussianBlur(value.mul(value), deviation, {}, sigma);
-  cv::sqrt(deviation, deviation);
+  if (!everywhere) value.setTo(0.0, valid == 0);
+  value -= mean_of(value);
+  if (!everywhere) value.setTo(0.0, valid == 0);
+  cv::sqrt(mean_of(value.mul(value)), deviation);
   const cv::Mat even = value / (deviation + kFloor);
   cv::Mat result;
   even.convertTo(result, CV_8U, kContrast, kMiddle);
   return result;
 }
 
-cv::Mat coarse_flow(const cv::Mat& reference, const cv::Mat& moving) {
+cv::Mat coarse_flow(const cv::Mat& reference, const cv::Mat& moving, const cv::Mat& valid) {
   const double shrink = std::max(1.0, reference.cols / static_cast<double>(kCoarseWidthPx));
   const cv::Size size(static_cast<int>(std::lround(reference.cols / shrink)),
                       static_cast<int>(std::lround(reference.rows / shrink)));
@@ -73,12 +85,14 @@ cv::Mat coarse_flow(const cv::Mat& reference, const cv::Mat& moving) {
   cv::Mat flow(reference.size(), CV_32FC2, cv::Scalar(0.0, 0.0));
   if (columns < 2 || rows < 2) return flow;
 
-  cv::Mat a, b, wide;
+  cv::Mat a, b, wide, small_valid;
   cv::resize(reference, a, size, 0, 0, cv::INTER_AREA);
   cv::resize(moving, b, size, 0, 0, cv::INTER_AREA);
-  cv::copyMakeBorder(even_light(b), wide, kReachPx, kReachPx, kReachPx, kReachPx,
+  if (!valid.empty()) cv::resize(valid, small_valid, size, 0, 0, cv::INTER_AREA);
+  if (!valid.empty()) small_valid = small_valid == 255;
+  cv::copyMakeBorder(even_light(b, small_valid), wide, kReachPx, kReachPx, kReachPx, kReachPx,
                      cv::BORDER_CONSTANT, cv::Scalar(128));
-  a = even_light(a);
+  a = even_light(a, small_valid);
   Scores scores;
   const int block = 2 * kCellPx;
   for (int y = 0; y < rows; ++y) {
@@ -118,19 +132,23 @@ cv::Mat coarse_flow(const cv::Mat& reference, const cv::Mat& moving) {
   return flow;
 }
 
-cv::Mat farneback_flow(const cv::Mat& reference, const cv::Mat& moving, const cv::Mat& initial) {
+cv::Mat farneback_flow(const cv::Mat& reference, const cv::Mat& moving, const cv::Mat& initial,
+                       const cv::Mat& valid) {
   check(reference.type() == CV_8U && moving.type() == CV_8U && reference.size() == moving.size(),
         "optical flow: expected two 8-bit gray images of one size, found {} x {} and {} x {}",
         reference.cols, reference.rows, moving.cols, moving.rows);
+  check(valid.empty() || (valid.type() == CV_8U && valid.size() == reference.size()),
+        "optical flow: expected a mask of {} x {}, found {} x {}", reference.cols, reference.rows,
+        valid.cols, valid.rows);
   constexpr double kPyramidScale = 0.5;
   constexpr int kLevels = 2;  // the start is within a few pixels: a taller pyramid adds nothing
   constexpr int kWindowPx = 21, kIterations = 3;
   constexpr int kPolynomialPx = 7;
   constexpr double kPolynomialSigmaPx = 1.5;
-  cv::Mat flow = initial.empty() ? coarse_flow(reference, moving) : initial.clone();
-  cv::calcOpticalFlowFarneback(even_light(reference), even_light(moving), flow, kPyramidScale,
-                               kLevels, kWindowPx, kIterations, kPolynomialPx, kPolynomialSigmaPx,
-                               cv::OPTFLOW_USE_INITIAL_FLOW);
+  cv::Mat flow = initial.empty() ? coarse_flow(reference, moving, valid) : initial.clone();
+  cv::calcOpticalFlowFarneback(even_light(reference, valid), even_light(moving, valid), flow,
+                               kPyramidScale, kLevels, kWindowPx, kIterations, kPolynomialPx,
+                               kPolynomialSigmaPx, cv::OPTFLOW_USE_INITIAL_FLOW);
   return flow;
 }
 

@@ -20,15 +20,18 @@ constexpr int kWorkWidthPx = 320;            // the mean magnitude needs no fine
 constexpr int kReadAhead = 8;                // frames prepared while others are compared
 constexpr std::size_t kAtOnce = 2;           // candidates compared at the same time
 
-double mean_magnitude(const cv::Mat& flow) {
+// Over the valid pixels.
+double mean_magnitude(const cv::Mat& flow, const cv::Mat& valid) {
   double sum = 0.0;
   for (int y = 0; y < flow.rows; ++y) {
     const auto* row = flow.ptr<cv::Vec2f>(y);
     double row_sum = 0.0;
-    for (int x = 0; x < flow.cols; ++x) row_sum += std::hypot(row[x][0], row[x][1]);
+    const auto* known = valid.ptr<unsigned char>(y);
+    for (int x = 0; x < flow.cols; ++x)
+      if (known[x]) row_sum += std::hypot(row[x][0], row[x][1]);
     sum += row_sum;
   }
-  return sum / static_cast<double>(flow.total());
+  return sum / std::max(1, cv::countNonZero(valid));
 }
 
 struct Candidate {
@@ -52,8 +55,12 @@ std::vector<Candidate> prepare(const FrameSource& frames, int begin, int shrink)
 // The state of algorithm 2 between two frames.
 class Selection {
  public:
-  Selection(double threshold_px, int max_gap, double px_per_flow)
-      : threshold_px_(threshold_px), max_gap_(max_gap), px_per_flow_(px_per_flow) {}
+  /// `valid` is as small as the candidates.
+  Selection(double threshold_px, int max_gap, double px_per_flow, cv::Mat valid)
+      : threshold_px_(threshold_px),
+        max_gap_(max_gap),
+        px_per_flow_(px_per_flow),
+        valid_(std::move(valid)) {}
 
   void offer(const Candidate& frame) { queue_.push_back(frame); }
 
@@ -67,7 +74,9 @@ class Selection {
       // Speculation: once a candidate becomes the reference, the values of those after it are void.
       std::vector<double> values(std::min(queue_.size(), kAtOnce));
       tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t i) {
-        values[i] = px_per_flow_ * mean_magnitude(farneback_flow(reference_.gray, queue_[i].gray));
+        values[i] =
+            px_per_flow_ *
+            mean_magnitude(farneback_flow(reference_.gray, queue_[i].gray, {}, valid_), valid_);
       });
       for (const double value : values) {
         if (decide(next(), value)) break;
@@ -112,6 +121,7 @@ class Selection {
   double threshold_px_;
   int max_gap_;
   double px_per_flow_;
+  cv::Mat valid_;
   Candidate reference_;
   std::deque<Candidate> queue_;
   std::vector<Candidate> failed_;
@@ -126,7 +136,11 @@ Keyframes select_keyframes(const FrameSource& frames, const KeyframeOptions& opt
   options.check();
   const int width = frames.lens().width;
   const int shrink = std::max(1, width / kWorkWidthPx);
-  Selection selection(options.mean_flow_px * width / kReferenceWidthPx, options.max_gap, shrink);
+  cv::Mat valid = frames.valid();
+  if (shrink > 1)
+    cv::resize(valid, valid, {valid.cols / shrink, valid.rows / shrink}, 0, 0, cv::INTER_AREA);
+  Selection selection(options.mean_flow_px * width / kReferenceWidthPx, options.max_gap, shrink,
+                      valid == 255);
   progress.begin("key frames", static_cast<std::size_t>(frames.size()));
   std::vector<Candidate> block = prepare(frames, 0, shrink);
   while (!block.empty()) {

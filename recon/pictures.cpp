@@ -80,7 +80,7 @@ void draw_preprocess(const fs::path& folder, const FrameSource& frames,
     const cv::Mat bgr = frames.observations().image(index);
     cv::Mat gray;
     cv::cvtColor(bgr, gray, cv::COLOR_BGR2GRAY);
-    const cv::Mat reflection = detect_reflections(gray, options.reflections);
+    const cv::Mat reflection = detect_reflections(gray, options.reflections, frames.field());
     const Frame frame = frames.frame(index);
     write_image(original / name_of(index), bgr);
     write_image(mask / name_of(index), reflection);
@@ -98,7 +98,7 @@ void draw_pairs(const fs::path& folder, const FrameSource& frames,
     const PairAlignment& pair = pairs[p];
     const std::string name = fmt::format("{:06}-{:06}.png", pair.reference, pair.moving);
     const cv::Mat reference = frames.gray(pair.reference);
-    const cv::Mat flow = farneback_flow(reference, frames.gray(pair.moving));
+    const cv::Mat flow = farneback_flow(reference, frames.gray(pair.moving), {}, frames.valid());
     std::vector<double> lengths;
     for (std::size_t i = 0; i < pair.reference_px.size(); ++i)
       lengths.push_back((pair.moving_px[i] - pair.reference_px[i]).norm());

@@ -73,7 +73,8 @@ std::vector<Vec3> pixel_rays(const Lens& lens) {
   std::vector<Vec3> rays(static_cast<std::size_t>(lens.width) * lens.height, Vec3::Zero());
   for (int y = 0; y < lens.height; ++y)
     for (int x = 0; x < lens.width; ++x)
-      if (const auto ray = projector.unproject({x + 0.5, y + 0.5}))
+      if (const auto ray = projector.unproject({x + 0.5, y + 0.5});
+          ray && lens.passes_stop({x + 0.5, y + 0.5}))
         rays[static_cast<std::size_t>(y) * lens.width + x] = *ray;
   return rays;
 }

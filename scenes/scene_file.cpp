@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/check.h"
+#include "core/like.h"
 #include "core/random.h"
 #include "core/yaml.h"
 #include "scenes/portable_math.h"
@@ -165,10 +166,13 @@ void read_section(YamlReader& yaml, const char* name, std::uint64_t seed, Sectio
 
 void read_import(YamlReader& yaml, SceneFile& scene, const std::filesystem::path& file) {
   std::string mesh;
-  yaml.require("mesh", mesh);
-  scene.mesh = file.parent_path() / mesh;  // an absolute path stays itself
+  if (scene.mesh.empty())
+    yaml.require("mesh", mesh);
+  else
+    yaml.get("mesh", mesh);
+  if (!mesh.empty()) scene.mesh = file.parent_path() / mesh;  // an absolute path stays itself
   yaml.get("mm_per_unit", scene.import.mm_per_unit);
-  int wall = 0, ends = 0;
+  int wall = static_cast<int>(scene.import.wall), ends = static_cast<int>(scene.import.open_ends);
   yaml.get_choice("wall_normals", {std::begin(kWallNormals), std::end(kWallNormals)}, wall);
   scene.import.wall = static_cast<WallNormals>(wall);
   yaml.get_choice("open_ends", {std::begin(kOpenEnds), std::end(kOpenEnds)}, ends);
@@ -179,12 +183,10 @@ void read_import(YamlReader& yaml, SceneFile& scene, const std::filesystem::path
   scene.import.check(file.string());
 }
 
-}  // namespace
-
-SceneFile read_scene_file(const std::filesystem::path& file, std::uint64_t seed) {
-  YamlReader yaml = YamlReader::from_file(file);
-  SceneFile scene;
-  int kind = 0;
+// What the file says, over what `scene` holds.
+void read_over(SceneFile& scene, YamlReader& yaml, const std::filesystem::path& file,
+               std::uint64_t seed) {
+  int kind = static_cast<int>(scene.kind);
   yaml.get_choice("kind", {"procedural", "mesh"}, kind);
   scene.kind = static_cast<SceneKind>(kind);
   if (scene.kind == SceneKind::mesh) {
@@ -209,6 +211,14 @@ SceneFile read_scene_file(const std::filesystem::path& file, std::uint64_t seed)
   }
   yaml.finish();
   scene.stomach.check(file.string());
+}
+
+}  // namespace
+
+SceneFile read_scene_file(const std::filesystem::path& file, std::uint64_t seed) {
+  SceneFile scene;
+  for (LikeFile& at : read_like_chain("scenes", "scene", file))
+    read_over(scene, at.yaml, at.file, seed);
   return scene;
 }
 
@@ -220,7 +230,8 @@ std::string resolved_yaml(const SceneFile& scene) {
     writer.text = fmt::format(
         "kind: mesh\nmesh: {}\nmm_per_unit: {}\nwall_normals: {}\nopen_ends: {}\ncomponent: {}\n"
         "target_edge_mm: {}\nwith_relief: {}\n",
-        quoted(scene.mesh.generic_string()), o.mm_per_unit, kWallNormals[static_cast<int>(o.wall)],
+        quoted(std::filesystem::absolute(scene.mesh).lexically_normal().generic_string()),
+        o.mm_per_unit, kWallNormals[static_cast<int>(o.wall)],
         kOpenEnds[static_cast<int>(o.open_ends)], o.component, o.target_edge_mm, o.with_relief);
   } else {
     writer.text = "kind: procedural\n";

@@ -21,6 +21,8 @@ struct SceneFile {
   DeformationOptions deformation;
 };
 
+/// With `like: NAME_OR_FILE` what the file does not say is as in that preset or file (core/like.h).
+///
 /// A number of `relief`, `mucosa`, `lesions` or `objects`, `scale` and `variation` may be a
 /// distribution in place of a value:
 ///   {uniform: [least, most]}, {normal: [mean, deviation]} (cut off at two deviations),
@@ -29,7 +31,8 @@ struct SceneFile {
 /// Throws Error with file, line and column.
 SceneFile read_scene_file(const std::filesystem::path& file, std::uint64_t seed);
 
-/// A file that holds every default and every draw: with the same seed it gives the same scene.
+/// A file that holds every default and every draw, and builds on no other scene file: with the same
+/// seed it gives the same scene. A mesh is named by its absolute path.
 std::string resolved_yaml(const SceneFile& scene);
 
 }  // namespace rugae

@@ -2,6 +2,7 @@
 
 #include "core/check.h"
 #include "core/files.h"
+#include "core/like.h"
 #include "core/presets.h"
 #include "dataset/estimate.h"
 #include "dataset/layout.h"
@@ -21,10 +22,15 @@ constexpr std::size_t kHashLetters = 10;
 
 std::string stem(const std::string& name_or_path) { return fs::path(name_or_path).stem().string(); }
 
-// A preset may build on another of its kind, so all of them count.
+// A preset may build on another of its kind, so all of them count, and a file on other files.
 std::string preset_hash(const std::string& kind, const std::string& what,
                         const std::string& name_or_path) {
-  std::string hashes = sha256_of_file(find_preset(kind, what, name_or_path));
+  const fs::path file = find_preset(kind, what, name_or_path);
+  std::string hashes;
+  if (file.extension() == ".yaml" || file.extension() == ".yml")
+    for (const LikeFile& of : read_like_chain(kind, what, file)) hashes += sha256_of_file(of.file);
+  else
+    hashes = sha256_of_file(file);
   for (const std::string& name : preset_names(kind))
     hashes += sha256_of_file(find_preset(kind, what, name));
   return sha256_of_bytes(hashes);

@@ -1,6 +1,7 @@
 #include <functional>
 
 #include "core/check.h"
+#include "core/like.h"
 #include "core/presets.h"
 #include "core/units.h"
 #include "core/yaml.h"
@@ -8,8 +9,6 @@
 
 namespace rugae {
 namespace {
-
-constexpr int kMaxLikes = 8;  // a chain of `like` this long goes in a circle
 
 /// Where a field stands ("loops.count"), for errors: file, line and column, or a name.
 using PlaceOf = std::function<std::string(const std::string& field)>;
@@ -81,34 +80,22 @@ void read(YamlReader& yaml, TrajectoryOptions& options) {
   }
 }
 
-TrajectoryOptions load(const std::string& name_or_path, const std::filesystem::path& folder,
-                       int likes) {
-  auto file = find_preset("trajectories", "trajectory",
-                          folder.empty() || name_or_path.find('.') == std::string::npos
-                              ? name_or_path
-                              : (folder / name_or_path).string());
-  YamlReader yaml = YamlReader::from_file(file);
-  TrajectoryOptions options;
-  std::string like;
-  yaml.get("like", like);
-  if (!like.empty()) {
-    check(likes < kMaxLikes, "{}: like goes in a circle", yaml.where("like"));
-    options = load(like, file.parent_path(), likes + 1);
-  }
-  options.name = file.stem().string();
-  std::string track;
-  yaml.get("file", track);
-  if (!track.empty()) options.file = file.parent_path() / track;
-  read(yaml, options);
-  yaml.finish();
-  check_ranges(options, [&](const std::string& field) { return place_in(yaml, field); });
-  return options;
-}
-
 }  // namespace
 
 TrajectoryOptions load_trajectory(const std::string& name_or_path) {
-  return load(name_or_path, {}, 0);
+  const auto asked = find_preset("trajectories", "trajectory", name_or_path);
+  TrajectoryOptions options;
+  for (auto& [file, yaml] : read_like_chain("trajectories", "trajectory", asked)) {
+    options.name = file.stem().string();
+    std::string track;
+    yaml.get("file", track);
+    if (!track.empty()) options.file = file.parent_path() / track;
+    read(yaml, options);
+    yaml.finish();
+    check_ranges(options,
+                 [&yaml = yaml](const std::string& field) { return place_in(yaml, field); });
+  }
+  return options;
 }
 
 void TrajectoryOptions::check(const std::string& where) const {

@@ -55,6 +55,7 @@ struct FrameSource::Impl {
   PreprocessOptions options;
   Lens lens;
   std::optional<Undistortion> undistortion;
+  cv::Mat field;  // of the observations: 255 inside the field stop
   cv::Mat valid;
   cv::Mat gain;  // 1 / V; empty when switched off
   std::vector<double> profile;
@@ -64,15 +65,17 @@ struct FrameSource::Impl {
   Impl(const Observations& source, const PreprocessOptions& chosen)
       : observations(source), options(chosen), lens(source.lens()) {
     options.check();
+    const Lens& original = observations.lens();
+    field = cv::Mat(original.height, original.width, CV_8U, cv::Scalar(0));
+    for (int y = 0; y < original.height; ++y)
+      for (int x = 0; x < original.width; ++x)
+        if (original.passes_stop({x + 0.5, y + 0.5})) field.at<unsigned char>(y, x) = 255;
     if (options.undistort) {
       lens = observations.lens().pinhole();
       undistortion.emplace(observations.lens(), lens);
       valid = undistortion->valid();
     } else {
-      valid = cv::Mat(lens.height, lens.width, CV_8U, cv::Scalar(0));
-      for (int y = 0; y < lens.height; ++y)
-        for (int x = 0; x < lens.width; ++x)
-          if (lens.passes_stop({x + 0.5, y + 0.5})) valid.at<unsigned char>(y, x) = 255;
+      valid = field;
     }
     if (options.devignette) estimate_gain();
   }
@@ -100,7 +103,7 @@ struct FrameSource::Impl {
       const int index = static_cast<int>((2LL * i + 1) * observations.size() / (2LL * count));
       const cv::Mat gray = gray_of(observations.image(index));
       images.push_back(move(gray));
-      const cv::Mat reflection = move_mask(detect_reflections(gray, options.reflections));
+      const cv::Mat reflection = move_mask(detect_reflections(gray, options.reflections, field));
       usable.push_back(valid & ~reflection);
     }
     const double reach_px = 0.5 * std::hypot(lens.width, lens.height);
@@ -114,7 +117,7 @@ struct FrameSource::Impl {
   cv::Mat make_gray(int index) const {
     cv::Mat gray = gray_of(observations.image(index));
     if (options.reflections.suppress_for_pose)
-      gray = suppress_reflections(gray, detect_reflections(gray, options.reflections),
+      gray = suppress_reflections(gray, detect_reflections(gray, options.reflections, field),
                                   options.reflections);
     return correct(move(gray));
   }
@@ -122,7 +125,7 @@ struct FrameSource::Impl {
   Frame make_frame(int index) const {
     const cv::Mat bgr = observations.image(index);
     const cv::Mat gray = gray_of(bgr);
-    const cv::Mat reflection = detect_reflections(gray, options.reflections);
+    const cv::Mat reflection = detect_reflections(gray, options.reflections, field);
     const ReflectionOptions& chosen = options.reflections;
     const cv::Mat pose =
         chosen.suppress_for_pose ? suppress_reflections(gray, reflection, chosen) : gray;
@@ -139,6 +142,8 @@ FrameSource::~FrameSource() = default;
 int FrameSource::size() const { return impl_->observations.size(); }
 const Lens& FrameSource::lens() const { return impl_->lens; }
 const Observations& FrameSource::observations() const { return impl_->observations; }
+const cv::Mat& FrameSource::field() const { return impl_->field; }
+const cv::Mat& FrameSource::valid() const { return impl_->valid; }
 const std::vector<double>& FrameSource::vignetting_profile() const { return impl_->profile; }
 
 Frame FrameSource::frame(int index) const {

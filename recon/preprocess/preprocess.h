@@ -19,7 +19,7 @@ struct Frame {
   cv::Mat gray;        // CV_8U, for pose
   cv::Mat map_bgr;     // CV_8UC3, for the map
   cv::Mat reflection;  // CV_8U, 255 where a reflection was detected
-  cv::Mat valid;       // CV_8U, 255 where undistortion had an original pixel to take
+  cv::Mat valid;       // CV_8U, 255 where there was an original pixel that sees
 };
 
 /// Reads and preprocesses frames on demand (memory does not grow with their number; a small cache
@@ -35,6 +35,10 @@ class FrameSource {
   /// undistortion is off).
   const Lens& lens() const;
   const Observations& observations() const;
+  /// CV_8U, on the grid of the observations: 255 inside the field stop.
+  const cv::Mat& field() const;
+  /// Frame::valid, the same for all frames.
+  const cv::Mat& valid() const;
   Frame frame(int index) const;
   /// Only `gray`: what key frame selection and resection need.
   cv::Mat gray(int index) const;

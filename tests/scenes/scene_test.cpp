@@ -14,6 +14,7 @@
 #include "core/mesh_io.h"
 #include "core/presets.h"
 #include "core/yaml.h"
+#include "scenes/scene_file.h"
 #include "self_intersection.h"
 
 namespace rugae {
@@ -203,6 +204,114 @@ TEST_F(SceneFiles, BrokenYamlIsNamedByLineAndColumn) {
             path("e.yaml"));
   EXPECT_EQ(error_of(write("f.yaml", std::string("kind: mesh\nmesh: a.ply\nscale: 1\n"))),
             path("f.yaml") + ":3:1: unknown key 'scale'");
+}
+
+TEST_F(SceneFiles, LikeTakesWhatIsNotGiven) {
+  write("base.yaml", std::string("scale: 0.6\nrelief: {rugae_height_mm: 2, areae_size_mm: 2.5}\n"
+                                 "mucosa: {wetness: {uniform: [0.3, 0.8]}, oil: 0.25}\n"
+                                 "lesions: {polyp: 3, ulcer: 2}\n"
+                                 "deformation: {peristalsis: true, amplitude_mm: 5}\n"));
+  const auto read = [&](const std::string& name, const std::string& text) {
+    return read_scene_file(write(name, text), 4);
+  };
+  const SceneFile base = read_scene_file(path("base.yaml"), 4);
+  const SceneFile mine = read("mine.yaml",
+                              "like: base.yaml\nrelief: {rugae_height_mm: 1}\n"
+                              "lesions: {ulcer: 0}\ndeformation: {amplitude_mm: 4}\n");
+  EXPECT_EQ(mine.stomach.scale, 0.6);
+  EXPECT_EQ(mine.stomach.relief.rugae_height_mm, 1.0);
+  EXPECT_EQ(mine.stomach.relief.areae_size_mm, 2.5);
+  EXPECT_EQ(mine.mucosa.wetness, base.mucosa.wetness);  // the same draw
+  EXPECT_TRUE(mine.mucosa.wetness >= 0.3 && mine.mucosa.wetness <= 0.8);
+  EXPECT_EQ(mine.mucosa.oil, 0.25);
+  EXPECT_EQ(mine.stomach.instances.polyp, 3);
+  EXPECT_EQ(mine.stomach.instances.ulcer, 0);
+  EXPECT_TRUE(mine.deformation.peristalsis);
+  EXPECT_EQ(mine.deformation.amplitude_mm, 4.0);
+  // a value in place of a draw, and a draw in place of a value
+  const SceneFile other = read("other.yaml",
+                               "like: base.yaml\nmucosa: {wetness: 0.9}\n"
+                               "lesions: {polyp: {uniform: [10, 20]}}\n");
+  EXPECT_EQ(other.mucosa.wetness, 0.9);
+  EXPECT_TRUE(other.stomach.instances.polyp >= 10 && other.stomach.instances.polyp <= 20);
+}
+
+TEST_F(SceneFiles, AMeshLiesBesideTheFileThatNamesIt) {
+  fs::create_directories(path("base"));
+  write("base/ico.ply", icosahedron(60.0));
+  write("base/base.yaml", std::string("kind: mesh\nmesh: ico.ply\nwall_normals: outward\n"
+                                      "with_relief: false\nopen_ends: refuse\n"));
+  const auto mine = write("mine.yaml", std::string("like: base/base.yaml\ntarget_edge_mm: 4\n"));
+  const SceneFile read = read_scene_file(mine, 1);
+  EXPECT_EQ(read.kind, SceneKind::mesh);
+  EXPECT_EQ(read.import.wall, WallNormals::outward);
+  EXPECT_EQ(read.import.open_ends, OpenEnds::refuse);
+  EXPECT_FALSE(read.import.with_relief);
+  EXPECT_EQ(read.import.target_edge_mm, 4.0);
+  expect_whole(load(mine));
+  EXPECT_EQ(error_of(write("polyps.yaml", std::string("like: base/base.yaml\nlesions: {polyp: "
+                                                      "1}\n"))),
+            path("polyps.yaml") + ":2:10: lesions need a stomach of kind procedural");
+}
+
+TEST_F(SceneFiles, WhatIsResolvedBuildsOnNothing) {
+  fs::create_directories(path("base"));
+  fs::create_directories(path("elsewhere"));
+  write("base/ico.ply", icosahedron(60.0));
+  write("base/mesh.yaml", std::string("kind: mesh\nmesh: ico.ply\ntarget_edge_mm: 4\n"));
+  write("base/drawn.yaml", std::string("like: stomach-lesions\nvariation: {uniform: [0.2, 0.8]}\n"
+                                       "lesions: {polyp: {uniform: [1, 9]}}\n"));
+  for (const std::string name : {"base/mesh.yaml", "base/drawn.yaml"}) {
+    const Scene scene =
+        load(write("mine.yaml", "like: " + name + "\nmucosa: {wetness: {normal: [0.5, 0.1]}}\n"));
+    EXPECT_EQ(scene.name, "mine");
+    EXPECT_EQ(scene.resolved_yaml.find("like"), std::string::npos) << scene.resolved_yaml;
+    fs::rename(path(name), path("gone.yaml"));  // its base is needed no more
+    const Scene again = load(write("elsewhere/again.yaml", scene.resolved_yaml));
+    EXPECT_EQ(again.resolved_yaml, scene.resolved_yaml);
+    EXPECT_EQ(again.wall.vertices, scene.wall.vertices);
+  }
+  // also where the mesh is named from the folder the program runs in
+  write("base/mesh.yaml", std::string("kind: mesh\nmesh: ico.ply\ntarget_edge_mm: 4\n"));
+  const fs::path here = fs::current_path();
+  fs::current_path(path("base"));
+  const Scene scene = load("./mesh.yaml");
+  fs::current_path(here);
+  EXPECT_EQ(load(write("elsewhere/again.yaml", scene.resolved_yaml)).wall.vertices,
+            scene.wall.vertices);
+}
+
+TEST_F(SceneFiles, ThePresetsAreTheStomachAndWhatTheySay) {
+  const SceneFile stomach = read_scene_file(find_preset("scenes", "scene", "stomach"), 1);
+  for (const std::string& name : preset_names("scenes")) {
+    SceneFile other = read_scene_file(find_preset("scenes", "scene", name), 1);
+    EXPECT_EQ(other.deformation.peristalsis, name == "stomach-moving");
+    EXPECT_EQ(other.stomach.instances.polyp > 0, name == "stomach-lesions");
+    EXPECT_EQ(other.stomach.instances.bubbles > 0, name == "stomach-unclean");
+    other.deformation = stomach.deformation;
+    other.stomach.instances = stomach.stomach.instances;
+    EXPECT_EQ(resolved_yaml(other), resolved_yaml(stomach)) << name;
+  }
+}
+
+TEST_F(SceneFiles, WrongLikesAreNamedByLineAndColumn) {
+  EXPECT_EQ(error_of(write("a.yaml", std::string("scale: 1\nlike: a.yaml\n"))),
+            path("a.yaml") + ":2:7: like goes in a circle");
+  write("b.yaml", std::string("like: c.yaml\n"));
+  EXPECT_EQ(error_of(write("c.yaml", std::string("like: b.yaml\n"))),
+            path("b.yaml") + ":1:7: like goes in a circle");
+  EXPECT_EQ(error_of(write("d.yaml", std::string("like: stomch\n"))),
+            path("d.yaml") +
+                ":1:7: like: scene 'stomch': no such preset; did you mean 'stomach'?; known: "
+                "stomach, stomach-lesions, stomach-moving, stomach-unclean");
+  EXPECT_EQ(error_of(write("e.yaml", std::string("like: none.yaml\n"))),
+            path("e.yaml") + ":1:7: like: scene '" + path("none.yaml") + "': no such file");
+  // what is wrong in the other file is told of the other file
+  write("f.yaml", std::string("mucosa:\n  wetnes: 1\n"));
+  EXPECT_EQ(error_of(write("g.yaml", std::string("like: f.yaml\nmucosa: {oil: 1}\n"))),
+            path("f.yaml") + ":2:3: unknown key 'wetnes'; did you mean 'wetness'?");
+  EXPECT_EQ(error_of(write("h.yaml", std::string("liek: stomach\n"))),
+            path("h.yaml") + ":1:1: unknown key 'liek'; did you mean 'like'?");
 }
 
 TEST_F(SceneFiles, ACoarseMeshIsRoundedAndRefined) {

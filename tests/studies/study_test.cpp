@@ -22,7 +22,14 @@ class Study : public TemporaryFolder {
                  "lens: {model: brown_conrady, width: 160, height: 120, horizontal_fov_deg: 90}\n"
                  "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 10000, "
                  "read_noise_e: 5, shutter: global}\n");
-    write_atomic(folder_ / "short.yaml", "like: \"1\"\nlength_cm: 4\npasses: 1\n");
+    write_base(4);
+    write_atomic(folder_ / "short.yaml", "like: base.yaml\n");
+  }
+
+  // What short.yaml builds on.
+  void write_base(int length_cm) {
+    write_atomic(folder_ / "base.yaml",
+                 fmt::format("like: \"1\"\nlength_cm: {}\npasses: 1\n", length_cm));
   }
 
   fs::path write_study(const std::string& more) {
@@ -81,6 +88,13 @@ TEST_F(Study, RunsTheLoopOnceAndKeepsWhatIsFinished) {
   fs::remove_all(folder_ / "out" / "metrics");
   run(file);
   EXPECT_EQ(
+      json::parse(read_text(folder_ / "out" / "results.json")).at("cells").at(0).at("dataset"),
+      cell.at("dataset"));
+
+  // A change of the file that a file builds on is another dataset.
+  write_base(5);
+  run(file);
+  EXPECT_NE(
       json::parse(read_text(folder_ / "out" / "results.json")).at("cells").at(0).at("dataset"),
       cell.at("dataset"));
 }

@@ -60,6 +60,8 @@ TEST_F(TrajectoryFile, WrongContents) {
       ":1:20: pace.peak_speed times pace.burst_share is 1.8, expected less than 1 (the mean speed "
       "is 1)");
   EXPECT_EQ(load_error("like: mine.yaml\n"), ":1:7: like goes in a circle");
+  EXPECT_EQ(load_error("like: seven\n"),
+            ":1:7: like: trajectory 'seven': no such preset; known: 1, 2, 3, 4, 5, 6, inspection");
 }
 
 TEST_F(TrajectoryFile, LikeTakesWhatIsNotGiven) {
