@@ -124,13 +124,8 @@ bool same_bytes(const cv::Mat& a, const cv::Mat& b) {
 
 void expect_same(const CleanFrame& a, const CleanFrame& b, const std::string& what) {
   EXPECT_TRUE(same_bytes(a.radiance, b.radiance)) << "radiance " << what;
-  EXPECT_TRUE(same_bytes(a.truth.depth_mm, b.truth.depth_mm)) << "depth " << what;
-  EXPECT_TRUE(same_bytes(a.truth.normal, b.truth.normal)) << "normals " << what;
-  EXPECT_TRUE(same_bytes(a.truth.flow_px, b.truth.flow_px)) << "flow " << what;
-  EXPECT_TRUE(same_bytes(a.truth.backward_flow_px, b.truth.backward_flow_px))
-      << "backward flow " << what;
-  EXPECT_TRUE(same_bytes(a.truth.triangle, b.truth.triangle)) << "triangles " << what;
-  EXPECT_TRUE(same_bytes(a.truth.masks, b.truth.masks)) << "masks " << what;
+  for (const LabelImage& label : label_images())
+    EXPECT_TRUE(same_bytes(a.truth.*label.image, b.truth.*label.image)) << label.name << what;
 }
 
 Camera camera_with_lights() {
@@ -181,9 +176,11 @@ TEST(InstructionSets, FramesWhoseRaysGoThroughCornersAreTheSame) {
   next.camera = RowPoses(later);
   std::optional<CleanFrame> reference;
   for (const std::string& isa : instruction_sets()) {
-    const FrameRenderer renderer(
-        Surface(mesh, test::constant_material(test::lambert(0.5f))), camera,
-        {.choice = {true, true}, .paths = {.bounces = 2, .samples = 2, .seed = 3}, .device = isa});
+    const FrameRenderer renderer(Surface(mesh, test::constant_material(test::lambert(0.5f))),
+                                 camera,
+                                 {.labels = LabelSet::all(),
+                                  .paths = {.bounces = 2, .samples = 2, .seed = 3},
+                                  .device = isa});
     CleanFrame frame = renderer.render(now, &previous, &next);
     if (reference)
       expect_same(frame, *reference, isa);
@@ -217,7 +214,7 @@ TEST(InstructionSets, DatasetsAreTheSame) {
   options.frames = 3;
   options.render.light.bounces = 2;
   options.render.light.samples = 2;
-  options.render.truth = {.backward_flow = true, .triangles = true, .tracks = 40, .coverage = true};
+  options.render.truth = {.labels = LabelSet::all(), .tracks = 40, .coverage = true};
   options.render.output.radiance = true;
   const auto contents = [&](const fs::path& folder) {
     std::map<std::string, std::string> files;
