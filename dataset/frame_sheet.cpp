@@ -44,7 +44,9 @@ cv::Mat light_tile(const cv::Mat& light) {
   return bgr;
 }
 
-cv::Mat label_tile(const LabelImage& label, const cv::Mat& image, const cv::Mat& bgr) {
+}  // namespace
+
+cv::Mat label_picture(const LabelImage& label, const cv::Mat& image, const cv::Mat& bgr) {
   const auto is = [&label](bool LabelSet::*member) { return label.wanted == member; };
   if (is(&LabelSet::depth) || is(&LabelSet::range)) return depth_tile(image);
   if (is(&LabelSet::flow) || is(&LabelSet::backward_flow)) return flow_tile(image);
@@ -53,8 +55,6 @@ cv::Mat label_tile(const LabelImage& label, const cv::Mat& image, const cv::Mat&
   if (label.coding == LabelCoding::normals) return normal_picture(image);
   return light_tile(image);
 }
-
-}  // namespace
 
 std::vector<SheetTile> label_tiles(const std::filesystem::path& dataset, int frame) {
   // A dataset of which one frame was made is good enough.
@@ -70,7 +70,7 @@ std::vector<SheetTile> label_tiles(const std::filesystem::path& dataset, int fra
     const cv::Mat image = label.read(file);
     check(image.type() == label.type && image.size() == bgr.size(), "{}: not of the frame's size",
           file.string());
-    tiles.push_back({label.name, label_tile(label, image, bgr)});
+    tiles.push_back({label.name, label_picture(label, image, bgr)});
   }
   return tiles;
 }

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "dataset/truth.h"
+#include "dataset/label_images.h"
 
 namespace rugae {
 
@@ -14,7 +14,10 @@ struct SheetTile {
   cv::Mat bgr;  // CV_8UC3
 };
 
-/// Every label that the dataset holds for a frame, as a picture. Colours: dataset/colours.h.
+/// A label of a frame as a picture of its own; `bgr` is the frame. Colours: dataset/colours.h.
+cv::Mat label_picture(const LabelImage& label, const cv::Mat& image, const cv::Mat& bgr);
+
+/// Every label that the dataset holds for a frame, as a picture.
 std::vector<SheetTile> label_tiles(const std::filesystem::path& dataset, int frame);
 
 /// The tiles row by row, each scaled into `tile_width_px` by three quarters of it, on a dark page,

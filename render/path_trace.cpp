@@ -124,7 +124,7 @@ void PathTracer::trace(std::span<const Emitter> lights, const Wall& wall, const 
     for (int bounce = 1; paths.count > 0; ++bounce) {
       const auto n = static_cast<std::size_t>(paths.count);
       wall.raycaster().intersect(paths.eyes(), {paths.direction_world.data(), n},
-                                 {paths.hit.data(), n});
+                                 {paths.hit.data(), n}, RayOrder::scattered);
       wall.surface().look_up(paths, w.spread_rad, w.surface);
       const int places = w.surface.count;
       if (places == 0) break;
@@ -147,7 +147,8 @@ void PathTracer::trace(std::span<const Emitter> lights, const Wall& wall, const 
         }
         const auto m = static_cast<std::size_t>(places);
         wall.raycaster().hidden_from(std::span(w.from.data(), tile.one_eye ? 1 : m),
-                                     {w.point.data(), m}, {w.lit.data(), m}, {w.hidden.data(), m});
+                                     {w.point.data(), m}, {w.lit.data(), m}, {w.hidden.data(), m},
+                                     RayOrder::scattered);
         for (int k = 0; k < places; ++k)
           if (w.lit[k] && !w.hidden[k]) w.sum[w.owner[w.surface.lane[k]]] += w.add[k];
       }

@@ -38,10 +38,11 @@ struct Packet<16> {
   static constexpr auto occluded = rtcOccluded16;
 };
 
-RTCIntersectContext coherent_context() {
+RTCIntersectContext context_for(RayOrder order) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  context.flags = order == RayOrder::coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                              : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
   return context;
 }
 
@@ -127,8 +128,8 @@ Hit search(const Target& target, const Eye& eye, const Vec3& direction, double t
 
 template <int N>
 void intersect_packets(const Target& target, std::span<const Eye> eyes,
-                       std::span<const Vec3> directions, std::span<Hit> hits) {
-  RTCIntersectContext context = coherent_context();
+                       std::span<const Vec3> directions, std::span<Hit> hits, RayOrder order) {
+  RTCIntersectContext context = context_for(order);
   constexpr double kFar = std::numeric_limits<double>::infinity();
   for (std::size_t begin = 0; begin < directions.size(); begin += N) {
     const int count = static_cast<int>(std::min<std::size_t>(N, directions.size() - begin));
@@ -163,8 +164,8 @@ void intersect_packets(const Target& target, std::span<const Eye> eyes,
 template <int N>
 void occlusion_packets(const Target& target, std::span<const Eye> eyes,
                        std::span<const Vec3> points, std::span<const std::uint8_t> wanted,
-                       std::span<std::uint8_t> hidden) {
-  RTCIntersectContext context = coherent_context();
+                       std::span<std::uint8_t> hidden, RayOrder order) {
+  RTCIntersectContext context = context_for(order);
   for (std::size_t begin = 0; begin < points.size(); begin += N) {
     const int count = static_cast<int>(std::min<std::size_t>(N, points.size() - begin));
     alignas(64) typename Packet<N>::Ray packet;
@@ -359,16 +360,16 @@ Raycaster::Raycaster(Raycaster&&) noexcept = default;
 int Raycaster::packet_size() const { return state_->shared->packet_size; }
 
 void Raycaster::intersect(std::span<const Eye> eyes, std::span<const Vec3> directions,
-                          std::span<Hit> hits) const {
+                          std::span<Hit> hits, RayOrder order) const {
   check(hits.size() == directions.size() && (eyes.size() == 1 || eyes.size() == directions.size()),
         "raycaster: {} eyes and {} hits for {} rays", eyes.size(), hits.size(), directions.size());
   const Target target{state_->hierarchy.scene, state_->exact, state_->shared->center};
   if (packet_size() == 16)
-    intersect_packets<16>(target, eyes, directions, hits);
+    intersect_packets<16>(target, eyes, directions, hits, order);
   else if (packet_size() == 8)
-    intersect_packets<8>(target, eyes, directions, hits);
+    intersect_packets<8>(target, eyes, directions, hits, order);
   else
-    intersect_packets<4>(target, eyes, directions, hits);
+    intersect_packets<4>(target, eyes, directions, hits, order);
 }
 
 void Raycaster::intersect(const Vec3& origin, std::span<const Vec3> directions,
@@ -384,19 +385,19 @@ Hit Raycaster::intersect(const Vec3& origin, const Vec3& direction) const {
 }
 
 void Raycaster::hidden_from(std::span<const Eye> eyes, std::span<const Vec3> points,
-                            std::span<const std::uint8_t> wanted,
-                            std::span<std::uint8_t> hidden) const {
+                            std::span<const std::uint8_t> wanted, std::span<std::uint8_t> hidden,
+                            RayOrder order) const {
   check(wanted.size() == points.size() && hidden.size() == points.size() &&
             (eyes.size() == 1 || eyes.size() == points.size()),
         "raycaster: {} eyes, {} flags and {} answers for {} points", eyes.size(), wanted.size(),
         hidden.size(), points.size());
   const Target target{state_->hierarchy.scene, state_->exact, state_->shared->center};
   if (packet_size() == 16)
-    occlusion_packets<16>(target, eyes, points, wanted, hidden);
+    occlusion_packets<16>(target, eyes, points, wanted, hidden, order);
   else if (packet_size() == 8)
-    occlusion_packets<8>(target, eyes, points, wanted, hidden);
+    occlusion_packets<8>(target, eyes, points, wanted, hidden, order);
   else
-    occlusion_packets<4>(target, eyes, points, wanted, hidden);
+    occlusion_packets<4>(target, eyes, points, wanted, hidden, order);
 }
 
 void Raycaster::hidden_from(const Vec3& eye, std::span<const Vec3> points,

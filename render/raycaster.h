@@ -17,6 +17,9 @@ struct Eye {
   double beat = 0.0;
 };
 
+/// How alike neighbours in a list of rays are: it changes the time they take, and no result.
+enum class RayOrder { coherent, scattered };
+
 /// Safe to use from many threads at once.
 class Raycaster {
  public:
@@ -31,8 +34,8 @@ class Raycaster {
 
   /// The nearest hit of each ray; one eye for all of them or one for each. Directions are unit
   /// vectors; a zero direction meets nothing. Neighbouring rays should be neighbours in the list.
-  void intersect(std::span<const Eye> eyes, std::span<const Vec3> directions,
-                 std::span<Hit> hits) const;
+  void intersect(std::span<const Eye> eyes, std::span<const Vec3> directions, std::span<Hit> hits,
+                 RayOrder order = RayOrder::coherent) const;
   void intersect(const Vec3& origin, std::span<const Vec3> directions, std::span<Hit> hits) const;
   Hit intersect(const Vec3& origin, const Vec3& direction) const;
 
@@ -40,7 +43,8 @@ class Raycaster {
   /// point on the wall at the eye's time, nearer than kReach of the way, and 0 elsewhere. Points of
   /// which `wanted` is 0 are left out and give 0.
   void hidden_from(std::span<const Eye> eyes, std::span<const Vec3> points,
-                   std::span<const std::uint8_t> wanted, std::span<std::uint8_t> hidden) const;
+                   std::span<const std::uint8_t> wanted, std::span<std::uint8_t> hidden,
+                   RayOrder order = RayOrder::coherent) const;
   void hidden_from(const Vec3& eye, std::span<const Vec3> points,
                    std::span<const std::uint8_t> wanted, std::span<std::uint8_t> hidden) const;
 

@@ -7,6 +7,8 @@
 #include "core/check.h"
 #include "core/files.h"
 #include "core/presets.h"
+#include "dataset/image_io.h"
+#include "dataset/writer.h"
 #include "studies/html.h"
 #include "studies/paper_numbers.h"
 #include "studies/report_parts.h"
@@ -100,7 +102,19 @@ std::string overview_part(const std::vector<CellResult>& cells) {
          html::number(100.0 * at("tracking.tracked_share")) + " %",
          html::number(at("time.reconstruct_s"))});
   }
-  return "<section class=\"chapter\"><h2>All cells</h2>" + table.str() + "</section>\n";
+  std::string sheet = "<div class=\"sheet\">";
+  for (const CellResult& cell : cells) {
+    const DatasetLayout layout{cell.dataset};
+    const int frame = read_info(layout.info()).frames / 3;
+    sheet += fmt::format(
+        "<a href=\"#{0}\"><img loading=\"lazy\" src=\"{1}\" alt=\"{0}, frame {2}\"><span>{3}, "
+        "{4}</span></a>",
+        html::escape(cell.cell.name()), html::jpeg(read_image_bgr(layout.frame(frame)), 300), frame,
+        html::escape(paper_camera(stem(cell.cell.camera))),
+        html::escape(stem(cell.cell.trajectory)));
+  }
+  return "<section class=\"chapter\"><h2>All cells</h2>" + sheet + "</div>" + table.str() +
+         "</section>\n";
 }
 
 std::string chapter(const std::string& title, const std::string& intro, const std::string& body) {

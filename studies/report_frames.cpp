@@ -1,12 +1,16 @@
 // Frames from inside the stomach and what is known about every pixel of them.
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <map>
 #include <opencv2/imgproc.hpp>
 
 #include "core/check.h"
 #include "dataset/colours.h"
+#include "dataset/frame_sheet.h"
 #include "dataset/image_io.h"
+#include "dataset/label_images.h"
 #include "dataset/layout.h"
 #include "studies/html.h"
 #include "studies/report_parts.h"
@@ -24,6 +28,10 @@ std::vector<int> spread(int frames, int count) {
   return chosen;
 }
 
+bool has_label(const CellView& view, const std::string& name, int frame) {
+  return std::filesystem::exists(label_image(name).file(DatasetLayout{view.cell.dataset}, frame));
+}
+
 struct Range {
   double low, high;
 };
@@ -31,7 +39,9 @@ struct Range {
 // Over all the frames together, so that one far corner does not take all colours.
 Range depth_range(const CellView& view, const std::vector<int>& frames) {
   cv::Mat all;
-  for (const int i : frames) all.push_back(view.truth.depth_mm(i));
+  for (const int i : frames)
+    if (has_label(view, "depth", i)) all.push_back(view.truth.depth_mm(i));
+  if (all.empty()) return {0.0, 1.0};
   constexpr double kLow = 0.01, kHigh = 0.97;
   const double low = quantile(all, kLow), high = quantile(all, kHigh);
   if (!std::isfinite(low)) return {0.0, 1.0};
@@ -41,6 +51,7 @@ Range depth_range(const CellView& view, const std::vector<int>& frames) {
 double longest_flow_px(const CellView& view, const std::vector<int>& frames) {
   double longest = 1.0;
   for (const int i : frames) {
+    if (!has_label(view, "flow", i)) continue;
     cv::Mat parts[2], length;
     cv::split(view.truth.flow_px(i), parts);
     cv::magnitude(parts[0], parts[1], length);
@@ -79,37 +90,55 @@ std::string frames_part(const CellView& view) {
   const Range depth = depth_range(view, frames);
   const double longest = longest_flow_px(view, frames);
   const DatasetLayout layout{view.cell.dataset};
-  std::vector<std::string> seen, depths, normals, flows, masks;
+  // Pictures of each row by the name of the label; the observations under "".
+  std::map<std::string, std::vector<std::string>> rows;
   std::string times;
   for (const int i : frames) {
     const cv::Mat bgr = read_image_bgr(layout.frame(i));
-    const auto add = [&](std::vector<std::string>& list, const cv::Mat& image, const char* what) {
-      list.push_back(cell_picture(html::jpeg(image, width_px), what, view, i));
+    const auto add = [&](const std::string& name, const std::string& what, const cv::Mat& image) {
+      rows[name].push_back(cell_picture(html::jpeg(image, width_px), what, view, i));
     };
-    add(seen, bgr, "observation");
-    add(depths, depth_picture(view.truth.depth_mm(i), depth.low, depth.high), "true depth");
-    add(normals, normal_picture(view.truth.normal(i)), "true normals");
-    add(flows, flow_picture(view.truth.flow_px(i), longest), "true flow to the next frame");
-    add(masks, mask_picture(bgr, view.truth.masks(i)), "label masks");
+    add("", "observation", bgr);
+    for (const LabelImage& label : label_images()) {
+      if (!has_label(view, label.name, i)) continue;
+      const std::string name = label.name;
+      const cv::Mat image = view.truth.label(name, i);
+      if (name == "depth")
+        add(name, "true depth", depth_picture(image, depth.low, depth.high));
+      else if (name == "flow")
+        add(name, "true flow to the next frame", flow_picture(image, longest));
+      else
+        add(name, std::string("true ") + label.what, label_picture(label, image, bgr));
+    }
     times +=
         fmt::format("<span>frame {} &middot; {:.2f} s</span>", i, view.truth.track()[i].time_s);
   }
   std::string out = fmt::format("<div class=\"layers\" style=\"--frames:{}\">", frames.size());
   out += "<div class=\"layer times\"><div></div>" + times + "</div>";
-  out += row("What the capsule sees", "<p>8-bit, with noise and fall-off of the light</p>", seen);
-  out += row("Depth",
-             fmt::format("<p>along the optical axis</p><div class=\"bar\" "
-                         "style=\"background:{}\"></div><div class=\"ends\"><span>{:g}</span>"
-                         "<span>{:g} mm +</span></div>",
-                         depth_gradient_css(), depth.low, depth.high),
-             depths);
-  out += row("Normals", "<p>red: right, green: up, blue: towards the camera</p>", normals);
-  out += row("Flow",
-             fmt::format("<p>to the next frame; rim of the disc: {:g} px</p><img class=\"wheel\" "
-                         "src=\"{}\" alt=\"flow colours\">",
-                         longest, html::png(flow_wheel(96))),
-             flows);
-  out += row("Masks", "<p>" + mask_key_html() + "</p>", masks);
+  out += row("What the capsule sees", "<p>8-bit, with noise and fall-off of the light</p>",
+             rows.at(""));
+  const auto add_row = [&](const char* label, const std::string& name, const std::string& key) {
+    const auto found = rows.find(label);
+    if (found != rows.end()) out += row(name, key, found->second);
+  };
+  add_row("depth", "Depth",
+          fmt::format("<p>along the optical axis</p><div class=\"bar\" "
+                      "style=\"background:{}\"></div><div class=\"ends\"><span>{:g}</span>"
+                      "<span>{:g} mm +</span></div>",
+                      depth_gradient_css(), depth.low, depth.high));
+  add_row("normals", "Normals", "<p>red: right, green: up, blue: towards the camera</p>");
+  add_row("flow", "Flow",
+          fmt::format("<p>to the next frame; rim of the disc: {:g} px</p><img class=\"wheel\" "
+                      "src=\"{}\" alt=\"flow colours\">",
+                      longest, html::png(flow_wheel(96))));
+  add_row("masks", "Masks", "<p>" + mask_key_html() + "</p>");
+  for (const LabelImage& label : label_images()) {
+    const std::string name = label.name;
+    if (name == "depth" || name == "normals" || name == "flow" || name == "masks") continue;
+    std::string title = label.what;
+    title[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(title[0])));
+    add_row(label.name, title, "<p><code>truth/" + name + "</code></p>");
+  }
   return out + "</div>\n";
 }
 
