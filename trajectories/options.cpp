@@ -81,9 +81,10 @@ void read(YamlReader& yaml, TrajectoryOptions& options) {
   }
 }
 
-TrajectoryOptions load(const std::string& name_or_path, const std::filesystem::path& folder,
-                       int likes) {
-  auto file = find_preset("trajectories", "trajectory",
+// `what` stands before the name in errors.
+TrajectoryOptions load(const std::string& what, const std::string& name_or_path,
+                       const std::filesystem::path& folder, int likes) {
+  auto file = find_preset("trajectories", what,
                           folder.empty() || name_or_path.find('.') == std::string::npos
                               ? name_or_path
                               : (folder / name_or_path).string());
@@ -93,7 +94,7 @@ TrajectoryOptions load(const std::string& name_or_path, const std::filesystem::p
   yaml.get("like", like);
   if (!like.empty()) {
     check(likes < kMaxLikes, "{}: like goes in a circle", yaml.where("like"));
-    options = load(like, file.parent_path(), likes + 1);
+    options = load(yaml.where("like") + ": trajectory", like, file.parent_path(), likes + 1);
   }
   options.name = file.stem().string();
   std::string track;
@@ -108,7 +109,7 @@ TrajectoryOptions load(const std::string& name_or_path, const std::filesystem::p
 }  // namespace
 
 TrajectoryOptions load_trajectory(const std::string& name_or_path) {
-  return load(name_or_path, {}, 0);
+  return load("trajectory", name_or_path, {}, 0);
 }
 
 void TrajectoryOptions::check(const std::string& where) const {
