@@ -1,6 +1,6 @@
 #pragma once
 // Options described once. A struct's `fields` lists for each member its key, the variable and its
-// range; reading from YAML, checking and writing as JSON are visitors of that one list.
+// range; reading from YAML, checking, listing and writing as JSON are visitors of that one list.
 //
 //   template <typename Visitor>
 //   void fields(Visitor& v, KeyframeOptions& o) {
@@ -17,10 +17,12 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "core/check.h"
+#include "core/field.h"
 #include "core/units.h"
 #include "core/yaml.h"
 
@@ -131,6 +133,44 @@ struct FieldWriter {
   }
 };
 
+struct FieldLister {
+  std::string prefix;
+  std::vector<Field> list;
+
+  void flag(const std::string& key, bool&) { list.push_back({prefix + key, Field::Kind::flag}); }
+  void seed(const std::string& key, std::uint64_t&) {
+    list.push_back({prefix + key, Field::Kind::seed});
+  }
+  template <typename T, typename Bound>
+  void number(const std::string& key, T&, Bound low, Bound high) {
+    list.push_back({prefix + key,
+                    std::is_integral_v<T> ? Field::Kind::whole : Field::Kind::real,
+                    static_cast<double>(low),
+                    static_cast<double>(high),
+                    {}});
+  }
+  void angle(const std::string& key, double&, double low_rad, double high_rad) {
+    list.push_back({prefix + key + "_deg",
+                    Field::Kind::real,
+                    deg_from_rad(low_rad),
+                    deg_from_rad(high_rad),
+                    {}});
+  }
+  template <typename Enum>
+  void choice(const std::string& key, Enum&, const std::vector<std::string>& names) {
+    list.push_back({prefix + key, Field::Kind::word, 0.0, 0.0, names});
+  }
+  void word(const std::string& key, std::string&, const std::vector<std::string>& known) {
+    list.push_back({prefix + key, Field::Kind::word, 0.0, 0.0, known});
+  }
+  template <typename Options>
+  void section(const std::string& key, Options& options) {
+    FieldLister inner{prefix + key + ".", {}};
+    fields(inner, options);
+    list.insert(list.end(), inner.list.begin(), inner.list.end());
+  }
+};
+
 /// Throws Error naming `name`, the field, its value and its range.
 template <typename Options>
 void check_fields(Options options, const char* name) {
@@ -145,6 +185,13 @@ void read_fields(YamlReader yaml, Options& options) {
   FieldReader reader{std::move(yaml)};
   fields(reader, options);
   reader.yaml.finish();
+}
+
+template <typename Options>
+std::vector<Field> list_of_fields(Options options) {
+  FieldLister lister;
+  fields(lister, options);
+  return std::move(lister.list);
 }
 
 template <typename Options>

@@ -64,7 +64,9 @@ YamlReader::YamlReader(const YAML::Node& node, std::string name)
   check(node.IsMap(), "{}: {}, expected a mapping of keys to values",
         place(state_->name, node.Mark()), shown(node));
   for (const auto& entry : node) {
-    const std::string key = entry.first.as<std::string>();
+    check(entry.first.IsScalar(), "{}: a key is {}, expected a text",
+          place(state_->name, entry.first.Mark()), shown(entry.first));
+    const std::string key = entry.first.Scalar();
     check(!state_->values.contains(key), "{}: key '{}' stands twice",
           place(state_->name, entry.first.Mark()), key);
     state_->values.emplace(key, entry.second);
@@ -84,7 +86,7 @@ YamlReader YamlReader::from_file(const std::filesystem::path& file) {
 YamlReader YamlReader::from_text(const std::string& text, const std::string& name) {
   try {
     return {YAML::Load(text), name};
-  } catch (const YAML::ParserException& error) {
+  } catch (const YAML::Exception& error) {
     fail("{}: not YAML: {}", place(name, error.mark), error.msg);
   }
 }

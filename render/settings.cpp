@@ -96,6 +96,8 @@ void change_setting(const std::string& change, RenderSettings& settings) {
   read_settings(YamlReader::from_text("{" + path + ": " + text + "}", change), settings);
 }
 
+std::vector<Field> list_settings() { return list_of_fields(RenderSettings{}); }
+
 std::string settings_json(const RenderSettings& settings) {
   return json_of_fields(settings).dump();
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/field.h"
 #include "core/yaml.h"
 #include "dataset/label_images.h"
 #include "render/sensor_settings.h"
@@ -49,6 +50,9 @@ void read_settings(YamlReader yaml, RenderSettings& settings);
 
 /// One change by its path, such as "sensor.noise=false". Throws Error naming the change.
 void change_setting(const std::string& change, RenderSettings& settings);
+
+/// Every setting's path and range.
+std::vector<Field> list_settings();
 
 /// Every setting, as JSON.
 std::string settings_json(const RenderSettings& settings);

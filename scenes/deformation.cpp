@@ -90,6 +90,8 @@ void read_deformation(YamlReader yaml, DeformationOptions& options) {
   read_fields(std::move(yaml), options);
 }
 
+std::vector<Field> list_deformation() { return list_of_fields(DeformationOptions{}); }
+
 std::string deformation_yaml(const DeformationOptions& options) {
   return json_of_fields(options).dump();
 }

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "core/field.h"
 #include "core/yaml.h"
 #include "scenes/organ_axis.h"
 #include "scenes/scene.h"
@@ -25,6 +26,9 @@ struct DeformationOptions {
 
 /// Keeps what the mapping does not name. Throws Error with file, line and column.
 void read_deformation(YamlReader yaml, DeformationOptions& options);
+
+/// Every option's key and range.
+std::vector<Field> list_deformation();
 
 /// Every option, as a mapping in one line.
 std::string deformation_yaml(const DeformationOptions& options);
