@@ -14,6 +14,7 @@
 #include "dataset/manifest.h"
 #include "dataset/ply_io.h"
 #include "dataset/problem_list.h"
+#include "dataset/row_pose_check.h"
 #include "dataset/writer.h"
 
 namespace rugae {
@@ -41,10 +42,16 @@ class Checker {
     if (camera) check_frames(camera->lens, info.frames);
     const bool labelled =
         camera && track && wall && info.labels && static_cast<int>(track->size()) == info.frames;
+    if (labelled && info.truth.row_poses) check_row_poses(layout_, *camera, *track, problems_);
     if (labelled) check_all_labels({layout_, camera->lens, *track, &*camera, &*wall}, info);
     // Colour is led from frame to frame by one pose a frame and a wall that keeps still.
     if (labelled && problems_.none() && !info.truth.row_poses && !info.truth.wall_motion)
       check_colour(camera->lens, *track);
+    if (problems_.none() && result_.flow_samples == 0)
+      result_.notes.push_back(
+          layout_.truth().string() +
+          (info.labels ? ": nothing could be compared: no pixel's flow to the next frame is known"
+                       : ": nothing could be compared: made without labels"));
     result_.problems = problems_.take();
     return std::move(result_);
   }
@@ -109,12 +116,14 @@ class Checker {
     std::vector<LabelCheck> checks(static_cast<std::size_t>(frames));
     tbb::parallel_for(
         0, frames, [&](int i) { checks[static_cast<std::size_t>(i)] = check_labels(sources, i); });
+    std::vector<FlowAgreement> flows;
     std::vector<std::pair<LabelProblem, int>> kinds;  // the first of each kind, and how many follow
     for (int i = 0; i < frames; ++i) {
       for (const auto& file : files_of_frame(layout_, info, i)) note_missing(file);
       const LabelCheck& found = checks[static_cast<std::size_t>(i)];
-      result_.worst_flow_px = std::max(result_.worst_flow_px, found.worst_flow_px);
-      result_.flow_samples += found.flow_samples;
+      result_.worst_flow_px = std::max(result_.worst_flow_px, found.flow.worst_px);
+      result_.flow_samples += found.flow.samples;
+      flows.push_back(found.flow);
       for (const LabelProblem& problem : found.problems) {
         const auto same = std::ranges::find_if(
             kinds, [&problem](const auto& k) { return k.first.kind == problem.kind; });
@@ -128,6 +137,8 @@ class Checker {
       note(more == 0 ? problem.text
                      : fmt::format("{} (and in {} further frame{})", problem.text, more,
                                    more == 1 ? "" : "s"));
+    for (std::string& line : tell_disagreements(layout_, sources.track, flows))
+      note(std::move(line));
   }
 
   // Labels agree with each other: do they belong to the pictures?
