@@ -230,12 +230,18 @@ void add_check(CLI::App& app, int& exit_code) {
     constexpr int kBadInput = 2;
     if (!result.problems.empty()) exit_code = kBadInput;
     std::string text;
-    for (const std::string& problem : result.problems) text += problem + "\n";
-    text += fmt::format(
-        "{}: {} frames, {} files, {}", a->dataset.string(), result.frames, result.files,
-        result.problems.empty() ? "sound" : fmt::format("{} problems", result.problems.size()));
+    for (const auto* lines : {&result.problems, &result.notes})
+      for (const std::string& line : *lines) text += line + "\n";
+    text +=
+        fmt::format("{}: {} frames, {} files, {}", a->dataset.string(), result.frames, result.files,
+                    !result.problems.empty() ? fmt::format("{} problems", result.problems.size())
+                    : result.notes.empty()   ? "sound"
+                                             : "each of them sound");
     print(a->json,
-          {{"problems", result.problems}, {"frames", result.frames}, {"files", result.files}},
+          {{"problems", result.problems},
+           {"notes", result.notes},
+           {"frames", result.frames},
+           {"files", result.files}},
           text);
   });
 }

@@ -16,6 +16,7 @@
 #include "dataset/manifest.h"
 #include "dataset/ply_io.h"
 #include "dataset/problem_list.h"
+#include "dataset/row_pose_check.h"
 #include "dataset/writer.h"
 
 namespace rugae {
@@ -49,12 +50,18 @@ class Checker {
     if (track) check_times(*track, info.frames);
     if (camera) check_frames(camera->lens, info.frames);
     const bool labelled = camera && track && wall && static_cast<int>(track->size()) == info.frames;
+    if (labelled && info.truth.row_poses) check_row_poses(layout_, *camera, *track, problems_);
     if (labelled)
       check_all_labels({layout_, camera->lens, *track, &*camera, &*wall, is_sharp(info)}, info);
     // Colour is led from frame to frame by one pose a frame and a wall that keeps still.
     if (labelled && info.truth.labels.depth && problems_.none() && !info.truth.row_poses &&
         !info.truth.wall_motion)
       check_colour(camera->lens, *track);
+    if (problems_.none() && result_.flow_samples == 0)
+      result_.notes.push_back(
+          layout_.truth().string() +
+          (info.labels ? ": nothing could be compared: no pixel's flow to the next frame is known"
+                       : ": nothing could be compared: made without labels"));
     result_.problems = problems_.take();
     return std::move(result_);
   }
@@ -125,12 +132,14 @@ class Checker {
       const auto more = check_surface_labels(sources, *named, i);
       found.problems.insert(found.problems.end(), more.begin(), more.end());
     });
+    std::vector<FlowAgreement> flows;
     std::vector<std::pair<LabelProblem, int>> kinds;  // the first of each kind, and how many follow
     for (int i = 0; i < frames; ++i) {
       for (const auto& file : files_of_frame(layout_, info, i)) note_missing(file);
       const LabelCheck& found = checks[static_cast<std::size_t>(i)];
-      result_.worst_flow_px = std::max(result_.worst_flow_px, found.worst_flow_px);
-      result_.flow_samples += found.flow_samples;
+      result_.worst_flow_px = std::max(result_.worst_flow_px, found.flow.worst_px);
+      result_.flow_samples += found.flow.samples;
+      flows.push_back(found.flow);
       for (const LabelProblem& problem : found.problems) {
         const auto same = std::ranges::find_if(
             kinds, [&problem](const auto& k) { return k.first.kind == problem.kind; });
@@ -144,6 +153,8 @@ class Checker {
       note(more == 0 ? problem.text
                      : fmt::format("{} (and in {} further frame{})", problem.text, more,
                                    more == 1 ? "" : "s"));
+    for (std::string& line : tell_disagreements(layout_, sources.track, flows))
+      note(std::move(line));
   }
 
   // Labels agree with each other: do they belong to the pictures?

@@ -9,6 +9,7 @@ namespace rugae {
 
 struct DatasetCheck {
   std::vector<std::string> problems;  // one line each, naming the file; empty means sound
+  std::vector<std::string> notes;     // what could not be compared, one line each
   int frames = 0;
   std::size_t files = 0;
   /// Largest disagreement of the flow with depth and pose over all sampled pixels of all frames,

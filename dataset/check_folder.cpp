@@ -1,5 +1,6 @@
 #include "dataset/check_folder.h"
 
+#include <fmt/ranges.h>
 #include <tbb/parallel_for.h>
 
 #include <cmath>
@@ -63,7 +64,10 @@ class FolderChecker {
     check_flows();
     check_masks();
     check_poses();
-    if (can_warp()) warp();
+    if (can_warp())
+      warp();
+    else if (problems_.none())
+      note_what_lacks();
     result_.problems = problems_.take();
     return std::move(result_);
   }
@@ -181,6 +185,15 @@ class FolderChecker {
            folder_.depth_files.size() == images;
   }
 
+  void note_what_lacks() {
+    std::vector<std::string> lacks;
+    if (folder_.depth_files.empty()) lacks.push_back("no folder of depth (--depth)");
+    if (folder_.poses.empty()) lacks.push_back("no file of poses (--poses)");
+    if (folder_.image_files.size() < 2) lacks.push_back("a single image");
+    result_.notes.push_back(
+        fmt::format("{}: nothing could be compared: {}", root_.string(), fmt::join(lacks, ", ")));
+  }
+
   void warp() {
     WarpSequence sequence;
     sequence.lens = *lens_;
@@ -196,6 +209,7 @@ class FolderChecker {
     const Diagnosis found = diagnose(sequence, {folder_.images.string(), folder_.depth.string(),
                                                 folder_.poses.string(), folder_.flow.string()});
     for (const std::string& problem : found.problems) problems_.note(problem);
+    result_.notes = found.notes;
     result_.worst_flow_px = found.flow_px;
   }
 

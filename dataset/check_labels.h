@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "dataset/flow_agreement.h"
 #include "dataset/truth.h"
 
 namespace rugae {
@@ -16,8 +17,7 @@ struct LabelProblem {
 
 struct LabelCheck {
   std::vector<LabelProblem> problems;
-  double worst_flow_px = -1.0;  // -1: nothing to compare
-  std::size_t flow_samples = 0;
+  FlowAgreement flow;
 };
 
 /// What the labels of frame `index` are to be compared with.

@@ -10,7 +10,9 @@
 #include "core/check.h"
 #include "core/units.h"
 #include "dataset/contest.h"
+#include "dataset/image_overlap.h"
 #include "dataset/pose_mistakes.h"
+#include "dataset/readings.h"
 #include "dataset/turn_search.h"
 #include "dataset/warp_pairs.h"
 
@@ -22,22 +24,6 @@ constexpr double kSoundShare = 5e-4, kSoundFlow_px = 2e-3;
 // What an explanation may leave: measured depth has a few per cent of noise.
 constexpr double kExplainedShare = 0.03;
 
-// A way to read the sequence: which depth, which pose, which flow stand for a frame.
-struct Reading {
-  std::string text;
-  std::function<Rigid3(const Rigid3&)> pose = [](const Rigid3& p) { return p; };
-  DepthKind kind = DepthKind::z;
-};
-
-std::vector<Reading> pose_readings() {
-  std::vector<Reading> readings = {{"as given"}};
-  for (const PoseMistake& mistake : pose_mistakes())
-    readings.push_back({mistake.text, mistake.undo});
-  readings.push_back({"range"});
-  readings.back().kind = DepthKind::range;
-  return readings;
-}
-
 class Diagnoser {
  public:
   Diagnoser(const WarpSequence& sequence, const WarpNames& names)
@@ -47,12 +33,7 @@ class Diagnoser {
     poses();
     if (sequence_.read_flow_px) flow();
     shifts();
-    constexpr double kDisagree = 0.1;
-    if (result_.problems.empty() && result_.depth_share > kDisagree)
-      result_.problems.push_back(
-          fmt::format("{}: disagrees with {}: depth led to the next frame is off by {} in the "
-                      "median; no usual mistake explains it",
-                      names_.depth, names_.poses, percent(result_.depth_share)));
+    if (result_.problems.empty()) unexplained();
     return std::move(result_);
   }
   Diagnosis colour() {
@@ -80,38 +61,155 @@ class Diagnoser {
   // between the frames is a contest of its own, since slow and fast sequences tell at different
   // ones.
   void poses() {
-    const std::vector<Reading> readings = pose_readings();
-    std::size_t won = 0;
-    double margin = 0.0;
-    std::string evidence;
+    const std::vector<Reading> readings = single_readings();
+    Won won;
+    std::size_t winner_of_all = 0;
+    std::vector<Contest> contests;
     for (const int gap : {1, 2, 4, 8, 16}) {
       const std::vector<FramePair> pairs = spread_pairs(sequence_.size(), gap);
       if (pairs.empty()) break;
-      const Contest contest = depth_contest(pairs, readings);
-      // frames too far apart to see the same wall tell nothing
-      constexpr double kOverlap = 0.4;
-      if (gap == 1 && static_cast<double>(contest.counts[0]) >=
-                          std::max(Contest::kFewSamples,
-                                   kOverlap * static_cast<double>(pairs.size() * grid_.patches())))
-        result_.depth_share = contest.medians[0];
+      const Contest& contest = contests.emplace_back(depth_contest(pairs, readings));
+      keep_as_given(gap, contest, static_cast<double>(pairs.size() * grid_.patches()));
       const std::size_t winner = contest.winner(kSoundShare, kExplainedShare);
-      if (winner == 0 || contest.margin(winner) <= margin) continue;
-      won = winner;
-      margin = contest.margin(winner);
-      evidence = fmt::format("depth led to {} is off by {} as given, by {} otherwise", after(gap),
-                             percent(contest.medians[0]), percent(contest.medians[winner]));
+      if (winner == 0 || contest.margin(winner) <= won.margin) continue;
+      winner_of_all = winner;
+      won = {readings[winner], contest.margin(winner), contest.medians[winner],
+             depth_evidence(gap, contest, winner)};
     }
-    if (won == 0 && frozen_rotation()) return;
-    if (won == 0) won = photometric_winner(readings, evidence);
-    if (won == 0 && other_scale()) return;
-    if (won == 0) return;
-    reading_ = readings[won];
-    if (reading_.kind == DepthKind::range)
+    // between neighbours of a slow path poses that hardly move at all fit as well
+    constexpr double kElsewhere = 0.1;
+    if (!fits_all(contests, winner_of_all, kElsewhere)) won = {};
+    if (won.margin == 0.0 && frozen_rotation()) return;
+    // what a single mistake leaves over may be another one
+    constexpr double kLeftOver = 2e-3;
+    if (won.margin == 0.0 ? !result_.compared || worst_share_ > kExplainedShare
+                          : won.left > kLeftOver)
+      if (two_mistakes(won.reading)) return;
+    if (won.margin == 0.0 && result_.compared) won = photometric_winner(readings);
+    if (won.margin == 0.0) {
+      other_scale();
+      return;
+    }
+    reading_ = won.reading;
+    result_.problems.push_back(
+        fmt::format("{}: {}: {}", reading_.kind == DepthKind::range ? names_.depth : names_.poses,
+                    reading_.text, won.evidence));
+  }
+
+  // The reading that fits best so far; margin 0: none.
+  struct Won {
+    Reading reading = {"as given"};
+    double margin = 0.0, left = 0.0;
+    std::string evidence;
+  };
+
+  // Wherever enough of it was compared.
+  static bool fits_all(const std::vector<Contest>& contests, std::size_t reading, double most) {
+    return std::ranges::all_of(contests, [&](const Contest& contest) {
+      return static_cast<double>(contest.counts[reading]) < Contest::kFewSamples ||
+             contest.medians[reading] <= most;
+    });
+  }
+
+  static std::string depth_evidence(int gap, const Contest& contest, std::size_t winner) {
+    return fmt::format("depth led to {} is off by {} as given, by {} otherwise", after(gap),
+                       percent(contest.medians[0]), percent(contest.medians[winner]));
+  }
+
+  // How far the files as they are were compared, and how far they disagree at most.
+  void keep_as_given(int gap, const Contest& contest, double patches) {
+    const double landed = static_cast<double>(contest.counts[0]);
+    overlap_ = std::max(overlap_, landed / patches);
+    // frames too far apart to see the same wall tell nothing
+    constexpr double kOverlap = 0.4;
+    const bool tells = landed >= std::max(Contest::kFewSamples, kOverlap * patches);
+    if (gap == 1 && tells) result_.depth_share = contest.medians[0];
+    if (tells && !(contest.medians[0] <= worst_share_)) {
+      worst_share_ = contest.medians[0];
+      worst_gap_ = gap;
+    }
+    const bool agrees = landed >= Contest::kFewSamples && contest.medians[0] <= kExplainedShare;
+    result_.compared = result_.compared || tells || agrees;
+  }
+
+  // Two mistakes at once hide each other. There are so many pairs of them that the one which fits
+  // must fit well between frames near each other and far apart, and colour must not speak against
+  // it.
+  bool two_mistakes(const Reading& single) {
+    std::vector<Reading> readings = paired_readings();
+    const Reading given = readings[0];
+    readings[0] = single;  // better than that
+    Won won;
+    std::size_t winner_of_all = 0;
+    std::vector<Contest> contests;
+    for (const int gap : {1, 4, 16}) {
+      const std::vector<FramePair> pairs = spread_pairs(sequence_.size(), gap);
+      if (pairs.empty()) break;
+      const Contest& contest = contests.emplace_back(depth_contest(pairs, readings));
+      const std::size_t winner = contest.winner(kSoundShare, kExplainedShare);
+      constexpr double kLeast = 6.0;
+      if (winner == 0 || contest.margin(winner) <= std::max(kLeast, won.margin)) continue;
+      if (winner >= kFirstPair && !colour_allows(pairs, readings[winner])) continue;
+      winner_of_all = winner;
+      won = {readings[winner], contest.margin(winner), contest.medians[winner],
+             depth_evidence(gap, depth_contest(pairs, {given, readings[winner]}), 1)};
+    }
+    // a shift alone is told by shifts()
+    if (winner_of_all < kFirstPair || !fits_all(contests, winner_of_all, kExplainedShare))
+      return false;
+    reading_ = won.reading;
+    depth_and_poses_apart_ = reading_.depth_of != 0;
+    result_.problems.push_back(
+        fmt::format("{}: {}: {}", names_.poses, reading_.text, won.evidence));
+    return true;
+  }
+
+  bool colour_allows(const std::vector<FramePair>& pairs, const Reading& reading) {
+    std::vector<double> errors;
+    for (const FramePair& pair : pairs)
+      if (const cv::Mat depth = depth_of(pair.from, reading); !depth.empty())
+        append(errors, grid_.colour_errors(frames_.image(pair.from), depth, frames_.image(pair.to),
+                                           motion(pair.from, pair.to, reading), reading.kind));
+    constexpr double kUnlike = 0.7;  // unrelated patches: about 1
+    return static_cast<double>(errors.size()) < Contest::kFewSamples ||
+           median_of(std::move(errors)) <= kUnlike;
+  }
+
+  // Empty outside the sequence.
+  cv::Mat depth_of(int frame, const Reading& reading) {
+    return has(frame + reading.depth_of) ? frames_.depth_mm(frame + reading.depth_of) : cv::Mat();
+  }
+
+  // No mistake was found: was there anything to find one by?
+  void unexplained() {
+    constexpr double kDisagree = 0.1;
+    if (worst_share_ > kDisagree) {
       result_.problems.push_back(fmt::format(
-          "{}: the depth is the distance along the ray, not along z: {}", names_.depth, evidence));
-    else
-      result_.problems.push_back(
-          fmt::format("{}: the poses are wrong: {}: {}", names_.poses, reading_.text, evidence));
+          "{}: disagrees with {}: depth led to {} is off by {} in the median; no usual mistake "
+          "explains it, nor two at once",
+          names_.depth, names_.poses, after(worst_gap_), percent(worst_share_)));
+    } else if (!result_.compared) {
+      const std::string little = fmt::format(
+          "as depth and poses have it, {} of a frame lies in another one", percent(overlap_));
+      if (neighbours_look_alike())
+        result_.problems.push_back(fmt::format(
+            "{}: disagrees with {}: {}, but images show the same wall as the next; no usual "
+            "mistake explains it, nor two at once",
+            names_.depth, names_.poses, little));
+      else
+        result_.notes.push_back(
+            fmt::format("{}, {}, {}: nothing could be compared: frames hardly show the same wall: "
+                        "{}",
+                        names_.depth, names_.poses, names_.images, little));
+    }
+  }
+
+  bool neighbours_look_alike() {
+    std::vector<double> shares;
+    for (const FramePair& pair : spread_pairs(sequence_.size(), 1))
+      shares.push_back(found_again(sequence_.read_gray(pair.from), sequence_.read_gray(pair.to)));
+    constexpr double kAlike = 0.5;
+    return !shares.empty() && median_of(std::move(shares)) >= kAlike;
   }
 
   static std::string after(int gap) {
@@ -121,17 +219,23 @@ class Diagnoser {
   Contest depth_contest(const std::vector<FramePair>& pairs, const std::vector<Reading>& readings) {
     std::vector<std::vector<double>> errors(readings.size());
     for (const FramePair& pair : pairs) {
-      const cv::Mat from = frames_.depth_mm(pair.from), to = frames_.depth_mm(pair.to);
+      // of the frame itself, of the one before and of the next, as far as they are asked for
+      std::map<int, std::pair<cv::Mat, cv::Mat>> depths;
+      for (const Reading& reading : readings)
+        if (const auto [at, fresh] = depths.try_emplace(reading.depth_of); fresh)
+          at->second = {depth_of(pair.from, reading), depth_of(pair.to, reading)};
       tbb::parallel_for(std::size_t{0}, readings.size(), [&](std::size_t i) {
-        append(errors[i], grid_.depth_shares(from, to, motion(pair.from, pair.to, readings[i]),
-                                             readings[i].kind));
+        const auto& [from, to] = depths.at(readings[i].depth_of);
+        if (!from.empty() && !to.empty())
+          append(errors[i], grid_.depth_shares(from, to, motion(pair.from, pair.to, readings[i]),
+                                               readings[i].kind));
       });
     }
     return Contest(errors);
   }
 
   // Where depth does not tell (a wall at the same distance everywhere), colour may.
-  std::size_t photometric_winner(const std::vector<Reading>& readings, std::string& evidence) {
+  Won photometric_winner(const std::vector<Reading>& readings) {
     for (const int gap : {4, 1}) {
       const std::vector<FramePair> pairs = spread_pairs(sequence_.size(), gap);
       if (pairs.empty()) continue;
@@ -149,11 +253,11 @@ class Diagnoser {
       constexpr double kSoundColour = 0.15, kExplainedColour = 0.2;
       const std::size_t winner = contest.winner(kSoundColour, kExplainedColour);
       if (winner == 0) continue;
-      evidence = fmt::format("colour led to {} correlates to {:.2f} as given, to {:.2f} otherwise",
-                             after(gap), 1.0 - contest.medians[0], 1.0 - contest.medians[winner]);
-      return winner;
+      return {readings[winner], contest.margin(winner), 0.0,
+              fmt::format("colour led to {} correlates to {:.2f} as given, to {:.2f} otherwise",
+                          after(gap), 1.0 - contest.medians[0], 1.0 - contest.medians[winner])};
     }
-    return 0;
+    return {};
   }
 
   // Rotations that are all the same though the pictures turn: for each pair the turn is sought that
@@ -201,7 +305,7 @@ class Diagnoser {
   }
 
   // A unit nobody thought of: the factor of the poses' lengths for which depth agrees best.
-  bool other_scale() {
+  void other_scale() {
     for (const int gap : {4, 1}) {
       const std::vector<FramePair> pairs = spread_pairs(sequence_.size(), gap);
       if (pairs.empty()) continue;
@@ -225,76 +329,63 @@ class Diagnoser {
       contest_around(1e4, 64);
       for (const double width : {1.15, 1.03, 1.004}) contest_around(width, 8);
       const auto [contest, best] = contest_around(1.0005, 4);
-      if (contest.winner(kSoundShare, kExplainedShare) == 0) continue;
+      if (contest.winner(kSoundShare, kExplainedShare) == 0) {
+        // frames near each other fit nearly as well when the poses hardly move at all
+        if (static_cast<double>(contest.counts[best]) >= Contest::kFewSamples &&
+            contest.medians[best] > kExplainedShare)
+          return;
+        continue;
+      }
       result_.problems.push_back(
           fmt::format("{}: the poses are wrong: {}: depth led to {} is off by {} as given, by {} "
                       "otherwise",
                       names_.poses, scale_mistake(factor), after(gap), percent(contest.medians[0]),
                       percent(contest.medians[best])));
       reading_ = readings[best];
-      return true;
+      return;
     }
-    return false;
   }
 
   // Flow against depth and poses (read rightly by now). Each alternative takes depth, poses or
   // flow of another frame, or the flow another way.
   void flow() {
-    struct Alternative {
-      std::string text;
-      int depth, pose, flow;  // frames later
-      std::function<cv::Mat(const cv::Mat&)> as = [](const cv::Mat& f) { return f; };
-    };
-    const std::vector<Alternative> alternatives = {
-        {"", 0, 0, 0},
-        {"the flow's sign is flipped", 0, 0, 0, [](const cv::Mat& f) { return cv::Mat(-f); }},
-        {"the flow's x and y are swapped", 0, 0, 0,
-         [](const cv::Mat& f) {
-           cv::Mat swapped(f.size(), f.type());
-           cv::mixChannels(f, swapped, {0, 1, 1, 0});
-           return swapped;
-         }},
-        {"the flow leads to the frame before, not to the next: its sign and frame are off", 0, 0, 1,
-         [](const cv::Mat& f) { return cv::Mat(-f); }},
-        {"the flow is shifted by one frame: that of the frame before fits", 0, 0, -1},
-        {"the flow is shifted by one frame: that of the next frame fits", 0, 0, 1},
-        {"the depth is shifted by one frame: that of the frame before fits", -1, 0, 0},
-        {"the depth is shifted by one frame: that of the next frame fits", 1, 0, 0},
-        {"the poses are shifted by one frame: those of the frame before fit", 0, -1, 0},
-        {"the poses are shifted by one frame: those of the next frame fit", 0, 1, 0}};
-    std::vector<std::vector<double>> errors(alternatives.size());
+    const std::vector<FlowReading> readings = flow_readings();
+    std::vector<std::vector<double>> errors(readings.size());
     for (const FramePair& pair : spread_pairs(sequence_.size(), 1)) {
       const int t = pair.from;
       if (!has(t - 1) || !has(t + 2)) continue;
-      for (std::size_t i = 0; i < alternatives.size(); ++i) {
-        const Alternative& a = alternatives[i];
-        const cv::Mat flow = frames_.flow_px(t + a.flow);
-        if (flow.empty()) continue;
-        append(errors[i],
-               grid_.flow_errors_px(frames_.depth_mm(t + a.depth), a.as(flow),
-                                    motion(t + a.pose, t + a.pose + 1, reading_), reading_.kind));
+      for (std::size_t i = 0; i < readings.size(); ++i) {
+        const FlowReading& r = readings[i];
+        const cv::Mat flow = frames_.flow_px(t + r.flow_of),
+                      depth = depth_of(t + r.depth_of, reading_);
+        if (flow.empty() || depth.empty()) continue;
+        append(errors[i], grid_.flow_errors_px(depth, r.flow(flow),
+                                               motion(t + r.poses_of, t + r.poses_of + 1, reading_),
+                                               reading_.kind));
       }
     }
     const Contest contest(errors);
     if (contest.counts[0] < Contest::kFewSamples) return;
     result_.flow_px = contest.medians[0];
+    result_.compared = true;
     if (frozen_) return;
     const std::size_t winner = contest.winner(kSoundFlow_px, 1.0);
     constexpr double kDisagree_px = 1.0;
     if (winner == 0 && !(contest.medians[0] > kDisagree_px)) return;
-    const bool of_depth = winner == 6 || winner == 7, of_poses = winner == 8 || winner == 9;
-    depth_and_poses_apart_ = of_depth || of_poses;
+    const FlowReading& r = readings[winner];
+    depth_and_poses_apart_ |= r.depth_of != 0 || r.poses_of != 0;
+    const bool of_flow = winner == 0 || (r.depth_of == 0 && r.poses_of == 0) || r.pair;
     result_.problems.push_back(
         winner == 0
             ? fmt::format("{}: disagrees with depth and poses by {:.3g} px in the median; no usual "
-                          "mistake explains it",
+                          "mistake explains it, nor two at once",
                           names_.flow, contest.medians[0])
             : fmt::format("{}: {}: depth, poses and flow disagree by {:.3g} px as given, by {:.3g} "
                           "px otherwise",
-                          of_depth   ? names_.depth
-                          : of_poses ? names_.poses
-                                     : names_.flow,
-                          alternatives[winner].text, contest.medians[0], contest.medians[winner]));
+                          of_flow           ? names_.flow
+                          : r.depth_of != 0 ? names_.depth
+                                            : names_.poses,
+                          r.text, contest.medians[0], contest.medians[winner]));
   }
 
   // Depth against poses and colour, one frame off. Between neighbours of a steady path that is
@@ -400,6 +491,9 @@ class Diagnoser {
   WarpGrid grid_;
   Reading reading_;
   bool frozen_ = false, depth_and_poses_apart_ = false;
+  double overlap_ = 0.0;       // the largest share of a frame that lies in another, as given
+  double worst_share_ = -1.0;  // how far depth is off as given, where enough of it lies there
+  int worst_gap_ = 1;
   Diagnosis result_;
 };
 

@@ -26,7 +26,7 @@ std::vector<PoseMistake> all_mistakes() {
                                         }}};
   for (const double factor : {1000.0, 0.001, 100.0, 0.01, 10.0, 0.1})
     mistakes.push_back(
-        {scale_mistake(factor), [factor](const Rigid3& p) { return scaled(p, factor); }});
+        {scale_mistake(factor), [factor](const Rigid3& p) { return scaled(p, factor); }, factor});
   const struct {
     const char* text;
     Vec3 signs;

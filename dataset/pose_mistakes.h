@@ -12,6 +12,7 @@ namespace rugae {
 struct PoseMistake {
   std::string text;  // completes "the poses are wrong: ...": "the rotations are transposed"
   std::function<Rigid3(const Rigid3&)> undo;  // the pose that was meant: world_from_camera, mm
+  double factor = 1.0;                        // of lengths in `undo`; the depth's is 1 / factor
 };
 
 /// Simple ones first: where several fit alike, the first is meant.
