@@ -60,8 +60,9 @@ class Checker {
     if (problems_.none() && result_.flow_samples == 0)
       result_.notes.push_back(
           layout_.truth().string() +
-          (info.labels ? ": nothing could be compared: no pixel's flow to the next frame is known"
-                       : ": nothing could be compared: made without labels"));
+          (info.truth.labels.flow
+               ? ": nothing could be compared: no pixel's flow to the next frame is known"
+               : ": nothing could be compared: made without flow"));
     result_.problems = problems_.take();
     return std::move(result_);
   }
