@@ -27,7 +27,9 @@ frame "no interreflection" 350 --set light.bounces=0
 frame "two bounces" 350 --set light.bounces=2 light.samples=64
 frame "mucus, bubbles, debris" 200 --scene stomach-unclean
 frame "lesions" 200 --scene stomach-lesions
-for index in 180 360 540; do frame "moving wall, $((index / 30)) s" "$index" --scene stomach-moving --trajectory 2; done
+for second in 0 5 10 15; do  # one wave passes every 20 s
+  frame "peristalsis, $second s" $((30 * second)) --scene stomach-moving --trajectory scripts/contact_sheet/standing.yaml
+done
 
 frame "all labels" 200 --scene stomach-lesions --all-labels --set light.bounces=1 light.samples=64
 build/release/apps/rugae picture "$out/data" --frame 200 --labels --out "$out/labels.png"

@@ -40,7 +40,8 @@ RenderSettings settings_of(const std::string& text) {
 void reconcile(RenderSettings& s) {
   if (s.sensor.bayer == Bayer::none) s.output.mosaic = false;
   if (s.lens.motion_blur || s.lens.defocus) s.lens.samples = std::max(2, s.lens.samples);
-  if (s.truth.coverage) s.truth.triangles = true;
+  if (s.truth.coverage) s.truth.labels.triangles = true;
+  if (s.light.bounces == 0) s.truth.labels.indirect = false;
 }
 
 TEST(SettingsProperty, WithinTheirRangesTheyAreReadAndKept) {
@@ -158,7 +159,7 @@ TEST_F(SettingsRender, WhateverIsWithinItsRangeMakesASoundDataset) {
       RC_ASSERT(cv::checkRange(radiance, true, nullptr, 0.0, 1e30));
       RC_ASSERT(cv::sum(radiance)[1] > 0.0);
     }
-    if (s.labels) {  // a closed wall: every pixel sees it
+    if (s.wanted_labels().depth) {  // a closed wall: every pixel sees it
       const cv::Mat depth = read_any_exr(layout.truth() / "depth" / "000001.exr");
       RC_ASSERT(cv::checkRange(depth, true, nullptr, 1e-3, 1e3));
     }
