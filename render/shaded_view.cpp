@@ -15,16 +15,18 @@ namespace {
 
 // Of the light that reaches the camera from a wall seen edge-on: keeps outlines readable.
 constexpr float kAmbient = 0.25f;
-constexpr double kStepPast_mm = 1e-4;  // beyond a triangle that is left out
+// Beyond a triangle that is left out, a share of the mesh's size: well over the slack of the
+// traversal (kSwell in render/raycaster.cpp), which would propose the same triangle again.
+constexpr double kStepPast = 1e-5;
 
 // Colour of one ray with its first hit, in sRGB.
 Vec3f look(const TriangleMesh& mesh, const Raycaster& raycaster, const Vec3& eye, const Vec3& ray,
-           Hit hit, const ShadedViewOptions& options) {
+           Hit hit, double step_past_mm, const ShadedViewOptions& options) {
   Vec3 from = eye;
   constexpr int kMostLayers = 64;
   for (int layer = 0; options.cull_front && hit.met() && layer < kMostLayers; ++layer) {
     if (triangle_normal(mesh, hit.triangle).dot(ray) > 0.0) break;
-    from += (hit.range_mm + kStepPast_mm) * ray;
+    from += (hit.range_mm + step_past_mm) * ray;
     hit = raycaster.intersect(from, ray);
   }
   if (!hit.met()) return options.background_srgb;
@@ -47,6 +49,7 @@ cv::Mat shaded_view(const TriangleMesh& mesh, const Rigid3& cam_from_world, cons
   const Raycaster raycaster(mesh);
   const LensProjector projector(lens);
   const Rigid3 world_from_cam = cam_from_world.inverse();
+  const double step_past_mm = kStepPast * bounding_box(mesh).diagonal().norm();
   cv::Mat picture(lens.height, lens.width, CV_8UC3);
   const int per_pixel = options.samples * options.samples;
   tbb::parallel_for(0, lens.height, [&](int y) {
@@ -62,7 +65,8 @@ cv::Mat shaded_view(const TriangleMesh& mesh, const Rigid3& cam_from_world, cons
     for (int x = 0; x < lens.width; ++x) {
       Vec3f sum = Vec3f::Zero();
       for (int i = x * per_pixel; i < (x + 1) * per_pixel; ++i)
-        sum += look(mesh, raycaster, world_from_cam.translation, rays[i], hits[i], options);
+        sum += look(mesh, raycaster, world_from_cam.translation, rays[i], hits[i], step_past_mm,
+                    options);
       sum *= 255.0f / static_cast<float>(per_pixel);
       for (int c = 0; c < 3; ++c)
         picture.at<cv::Vec3b>(y, x)[2 - c] =
