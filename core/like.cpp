@@ -28,7 +28,7 @@ std::vector<LikeFile> read_like_chain(const std::string& kind, const std::string
   std::vector<LikeFile> chain;
   std::vector<fs::path> seen;
   for (fs::path next = file; !next.empty();) {
-    LikeFile& at = chain.emplace_back(next, YamlReader::from_file(next));
+    LikeFile& at = chain.emplace_back(LikeFile{next, YamlReader::from_file(next)});
     seen.push_back(fs::weakly_canonical(next));
     std::string like;
     at.yaml.get("like", like);
