@@ -157,8 +157,9 @@ void StomachOptions::check(const std::string& where) const {
 
 StomachShape::StomachShape(const StomachOptions& options, std::uint64_t seed)
     : scale_(options.scale),
-      axis_(main_axis(options, seed, scale_, top_radius_mm_), 6.0 * scale_, 4.0 * scale_,
-            kFlattening, Vec3::UnitY()),
+      // main_axis sets scale_: of arguments of one call nobody knows which is worked out first
+      axis_(main_axis(options, seed, scale_, top_radius_mm_), 6.0 * options.scale,
+            4.0 * options.scale, kFlattening, Vec3::UnitY()),
       oesophagus_(oesophagus_axis(scale_), 4.0 * scale_, 2.0 * scale_, 1.0, Vec3::UnitY()) {}
 
 double StomachShape::distance_mm(const Vec3& p, Vec3* gradient) const {
