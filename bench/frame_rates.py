@@ -74,7 +74,7 @@ def peak_mb(folder, frames):
 def noise_left(work):
     """Of 2 bounces and 16 paths a pixel: as a share of the light between walls, and of all light."""
     sys.path.insert(0, os.path.join(BENCH, "..", "build", "release", "python"))
-    import numpy
+    import numpy  # Debian's, as the module is made for its Python
     import rugae
 
     light = {}

@@ -59,53 +59,67 @@ ExactHit::ExactHit(const ExactHit& other, const VertexMotion& vertices)
 struct ExactHit::Ray {
   Vec3 origin;
   double beat;
-  int x, y, z;  // axes; z is the one along which the ray runs fastest
+  int z;  // the axis along which the ray runs fastest
   double shear_x, shear_y, along;
 
   Ray(const Vec3& o, const Vec3& direction, double when) : origin(o), beat(when) {
     direction.cwiseAbs().maxCoeff(&z);
-    x = z == 2 ? 0 : z + 1;
-    y = x == 2 ? 0 : x + 1;
+    const int x = (z + 1) % 3, y = (z + 2) % 3;
     along = 1.0 / direction[z];
     shear_x = direction[x] * along;
     shear_y = direction[y] * along;
   }
-  Vec3 operator()(const Vec3& p) const {
+  template <int kZ>
+  Vec3 sheared(const Vec3& p) const {
     const Vec3 d = p - origin;
-    return {d[x] - shear_x * d[z], d[y] - shear_y * d[z], d[z]};
+    return {d[(kZ + 1) % 3] - shear_x * d[kZ], d[(kZ + 2) % 3] - shear_y * d[kZ], d[kZ]};
+  }
+  Vec3 operator()(const Vec3& p) const {
+    return z == 0 ? sheared<0>(p) : z == 1 ? sheared<1>(p) : sheared<2>(p);
   }
 };
 
-// Where the ray meets the plane of a triangle, and how it passes the triangle's edges.
+// Where the ray meets the plane of a triangle.
 struct ExactHit::Meeting {
-  Vec3 corners[3];  // in the ray's frame
   double range_mm;
   double b0, b1, b2;
 
   // Written so that the not-a-number of a triangle seen edge-on is no hit.
   bool inside() const { return b0 >= 0.0 && b1 >= 0.0 && b2 >= 0.0 && range_mm > 0.0; }
-  bool within(double distance_mm) const {
-    if (inside()) return true;
-    for (int k = 0; k < 3; ++k)
-      if (squared_distance(corners[k].head<2>(), corners[(k + 1) % 3].head<2>()) <=
-          distance_mm * distance_mm)
-        return true;
-    return false;
-  }
   Hit as_hit(int triangle) const {
     return {triangle, range_mm, static_cast<float>(b1), static_cast<float>(b2)};
   }
 };
 
 ExactHit::Meeting ExactHit::meet(const Ray& ray, int triangle) const {
+  // The axis is a constant in each of the three: coordinates stay in registers.
+  return ray.z == 0   ? meet_along<0>(ray, triangle)
+         : ray.z == 1 ? meet_along<1>(ray, triangle)
+                      : meet_along<2>(ray, triangle);
+}
+
+template <int kZ>
+ExactHit::Meeting ExactHit::meet_along(const Ray& ray, int triangle) const {
   const Vec3i& t = (*triangles_)[triangle];
-  const Vec3 a = ray(vertices_(t[0], ray.beat)), b = ray(vertices_(t[1], ray.beat)),
-             c = ray(vertices_(t[2], ray.beat));
+  const Vec3 a = ray.sheared<kZ>(vertices_(t[0], ray.beat)),
+             b = ray.sheared<kZ>(vertices_(t[1], ray.beat)),
+             c = ray.sheared<kZ>(vertices_(t[2], ray.beat));
   const double u = c.x() * b.y() - c.y() * b.x(), v = a.x() * c.y() - a.y() * c.x(),
                w = b.x() * a.y() - b.y() * a.x();
   const double inverse = 1.0 / (u + v + w);
   const double b0 = u * inverse, b1 = v * inverse, b2 = w * inverse;
-  return {{a, b, c}, (b0 * a.z() + b1 * b.z() + b2 * c.z()) * ray.along, b0, b1, b2};
+  return {(b0 * a.z() + b1 * b.z() + b2 * c.z()) * ray.along, b0, b1, b2};
+}
+
+// The ray passes the triangle, or its edges within `distance_mm`, in the ray's frame.
+bool ExactHit::passes_near(const Ray& ray, int triangle, double distance_mm) const {
+  Vec2 corners[3];
+  for (int k = 0; k < 3; ++k)
+    corners[k] = ray(vertices_((*triangles_)[triangle][k], ray.beat)).head<2>();
+  for (int k = 0; k < 3; ++k)
+    if (squared_distance(corners[k], corners[(k + 1) % 3]) <= distance_mm * distance_mm)
+      return true;
+  return false;
 }
 
 Hit ExactHit::operator()(const Vec3& origin, const Vec3& direction, double beat,
@@ -113,23 +127,22 @@ Hit ExactHit::operator()(const Vec3& origin, const Vec3& direction, double beat,
   const Ray ray(origin, direction, beat);
   const Meeting first = meet(ray, proposed);
   if (std::min({first.b0, first.b1, first.b2}) > kNearEdge) return first.as_hit(proposed);
-  const Hit hit = nearest_around(ray, proposed);
+  // Whichever edge is near, the triangle on its other side has the nearest corner too.
+  const int corner =
+      first.b0 >= first.b1 && first.b0 >= first.b2 ? 0 : (first.b1 >= first.b2 ? 1 : 2);
+  const Hit hit = nearest_around(ray, (*triangles_)[proposed][corner]);
   return hit.met() ? hit : nearest_within_slack(ray, proposed);
 }
 
-// The triangle itself, and those that share a corner with it; some of them more than once.
 template <typename Visit>
-void ExactHit::for_each_around(int triangle, const Visit& visit) const {
-  for (int k = 0; k < 3; ++k) {
-    const int vertex = (*triangles_)[triangle][k];
-    for (int i = around_->first_of_vertex[vertex]; i < around_->first_of_vertex[vertex + 1]; ++i)
-      visit(around_->triangles_of_vertex[i]);
-  }
+void ExactHit::for_each_around(int vertex, const Visit& visit) const {
+  for (int i = around_->first_of_vertex[vertex]; i < around_->first_of_vertex[vertex + 1]; ++i)
+    visit(around_->triangles_of_vertex[i]);
 }
 
-Hit ExactHit::nearest_around(const Ray& ray, int triangle) const {
+Hit ExactHit::nearest_around(const Ray& ray, int vertex) const {
   Hit nearest;
-  for_each_around(triangle, [&](int t) {
+  for_each_around(vertex, [&](int t) {
     const Meeting m = meet(ray, t);
     if (m.inside() && comes_before(m.range_mm, t, nearest)) nearest = m.as_hit(t);
   });
@@ -143,13 +156,14 @@ Hit ExactHit::nearest_within_slack(const Ray& ray, int triangle) const {
   constexpr double kSheared = 3.0;  // the ray's frame stretches distances by less
   Hit nearest;
   std::vector<int> seen{triangle};
+  const auto look_at = [&](int t) {
+    if (std::ranges::find(seen, t) != seen.end()) return;
+    const Meeting m = meet(ray, t);
+    if (m.inside() && comes_before(m.range_mm, t, nearest)) nearest = m.as_hit(t);
+    if (m.inside() || passes_near(ray, t, kSheared * slack_mm_)) seen.push_back(t);
+  };
   for (std::size_t at = 0; at < seen.size() && seen.size() < kMostWithinSlack; ++at)
-    for_each_around(seen[at], [&](int t) {
-      if (std::ranges::find(seen, t) != seen.end()) return;
-      const Meeting m = meet(ray, t);
-      if (m.inside() && comes_before(m.range_mm, t, nearest)) nearest = m.as_hit(t);
-      if (m.within(kSheared * slack_mm_)) seen.push_back(t);
-    });
+    for (int k = 0; k < 3; ++k) for_each_around((*triangles_)[seen[at]][k], look_at);
   return nearest;
 }
 

@@ -40,9 +40,12 @@ class ExactHit {
     std::vector<int> first_of_vertex, triangles_of_vertex;
   };
   Meeting meet(const Ray& ray, int triangle) const;
+  template <int kZ>
+  Meeting meet_along(const Ray& ray, int triangle) const;
+  bool passes_near(const Ray& ray, int triangle, double distance_mm) const;
   template <typename Visit>
-  void for_each_around(int triangle, const Visit& visit) const;
-  Hit nearest_around(const Ray& ray, int triangle) const;
+  void for_each_around(int vertex, const Visit& visit) const;
+  Hit nearest_around(const Ray& ray, int vertex) const;
   Hit nearest_within_slack(const Ray& ray, int triangle) const;
 
   const std::vector<Vec3i>* triangles_;
