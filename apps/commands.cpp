@@ -260,7 +260,7 @@ void add_picture(CLI::App& app) {
   command.add_option("--columns", a->columns, "Pictures side by side")->capture_default_str();
   command.add_option("--width", a->width, "Of a picture, px")->capture_default_str();
   command.add_flag("--labels", a->labels, "Every label as well as the frame");
-  command.add_option("--out", a->out, "The sheet, a PNG")->required();
+  command.add_option("--out", a->out, "The sheet, a PNG or JPEG")->required();
   command.callback([a] {
     std::vector<SheetTile> tiles;
     for (const fs::path& dataset : a->sources) {

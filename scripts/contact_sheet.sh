@@ -32,7 +32,7 @@ for second in 0 5 10 15; do  # one wave passes every 20 s
 done
 
 frame "all labels" 200 --scene stomach-lesions --all-labels --set light.bounces=1 light.samples=64
-build/release/apps/rugae picture "$out/data" --frame 200 --labels --out "$out/labels.png"
-build/release/apps/rugae picture "${pictures[@]::${#pictures[@]}-1}" --columns 4 --out "$out/contact_sheet.png"
+build/release/apps/rugae picture "$out/data" --frame 200 --labels --out "$out/labels.jpg"
+build/release/apps/rugae picture "${pictures[@]::${#pictures[@]}-1}" --columns 4 --out "$out/contact_sheet.jpg"
 rm -rf "$out/data"
-echo "open $out/contact_sheet.png and $out/labels.png"
+echo "open $out/contact_sheet.jpg and $out/labels.jpg"
