@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# One frame of everything the simulator can do, on one sheet: contact_sheet.sh [OUT]; the sheets are OUT/contact_sheet.png
-# and OUT/labels.png (default out/contact_sheet/).
+# One frame of everything the simulator can do, on one sheet: contact_sheet.sh [OUT]; the sheets are OUT/contact_sheet.jpg
+# and OUT/labels.jpg (default out/contact_sheet/).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-out/contact_sheet}

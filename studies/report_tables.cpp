@@ -183,7 +183,7 @@ std::string headline_cards(const CellView& view) {
   out += card("Reconstructed", html::number(speed, 2), "frames/s",
               against_paper(speed, 1.0 / paper.seconds_per_frame_pair, "pairs/s", true));
   out += card("Simulated", html::number(value_at(metrics, "simulation.frames_per_s"), 2),
-              "frames/s", "with all labels");
+              "frames/s", "with its labels");
   out += card("Wall seen", html::number(kPercent * seen), "%",
               fmt::format("{} of {} cm&sup2;",
                           html::number(value_at(metrics, "coverage.seen_area_mm2") / 100.0),
