@@ -246,5 +246,31 @@ TEST(LensSamples, MaterialsOfTheSharpFrameServeTheSamples) {
   EXPECT_LE(apart, 0.01 * whole);                 // and nowhere far off
 }
 
+// Rays that a wide aperture sends elsewhere must not take the pixel's material along: stripes out
+// of focus vanish as they do when every ray asks for its own.
+TEST(LensSamples, RaysThatLandElsewhereAskForTheirOwnMaterial) {
+  const TriangleMesh wall = test::sphere_mesh(5, 20.0);
+  const Material stripes = [](std::span<const MaterialQuery> queries, std::span<MucosaSample> out) {
+    for (std::size_t i = 0; i < queries.size(); ++i)
+      out[i] = lambert(0.5f + 0.4f * std::sin(queries[i].rest_position_mm.x()));
+  };
+  FrameView view;
+  view.camera = RowPoses(Rigid3());
+  const FrameRenderer renderer(Surface(wall, stripes), test::small_camera(),
+                               {.vignetting = false, .keep_materials = true});
+  const CleanFrame sharp = renderer.render(view, nullptr, nullptr);
+  // A blur of fx A |1/20 - 1/8| = 6 px, half a stripe. One ray in 36 lands within the footprint,
+  // and takes a material up to a pixel away, which differs by a fifth.
+  const LensSampling sampling{.samples = 16, .aperture_radius_mm = 2.0, .focus_distance_mm = 8.0};
+  const cv::Mat once = renderer.gather(view, sampling, nullptr, sharp.materials),
+                each = renderer.gather(view, sampling);
+  double apart = 0.0, whole = 0.0;
+  for (int i = 0; i < 96 * 72; ++i) {
+    apart += (once.ptr<Vec3f>()[i] - each.ptr<Vec3f>()[i]).cwiseAbs().sum();
+    whole += each.ptr<Vec3f>()[i].sum();
+  }
+  EXPECT_LE(apart, 0.01 * whole);
+}
+
 }  // namespace
 }  // namespace rugae

@@ -103,12 +103,15 @@ TEST(SurfaceLabels, AlbedoRegionAndInstanceAreThoseOfThePoint) {
 }
 
 // The wall is brighter and wetter to one side.
+Vec3f graded_albedo(float x_mm) {
+  return {0.6f + 0.3f * x_mm / 40.0f, 0.4f, 0.3f - 0.2f * x_mm / 40.0f};
+}
 Material graded() {
   return [](std::span<const MaterialQuery> queries, std::span<MucosaSample> samples) {
     for (std::size_t k = 0; k < queries.size(); ++k) {
       const float x = queries[k].rest_position_mm.x() / 40.0f;
       samples[k] = {};
-      samples[k].albedo = Vec3f(0.6f + 0.3f * x, 0.4f, 0.3f - 0.2f * x);
+      samples[k].albedo = graded_albedo(queries[k].rest_position_mm.x());
       samples[k].coverage = 0.5f + 0.4f * x;
     }
   };
@@ -122,6 +125,7 @@ TEST(SurfaceLabels, DirectAndIndirectLightAddUpToTheWhole) {
   const auto render = [&](int bounces) {
     LabelSet labels;
     labels.diffuse = labels.specular = labels.indirect = true;
+    labels.albedo = labels.triangles = true;
     return FrameRenderer(Surface(wall, graded()), camera,
                          {.labels = labels, .paths = {.bounces = bounces, .samples = 4}})
         .render(pose, nullptr);
@@ -131,6 +135,8 @@ TEST(SurfaceLabels, DirectAndIndirectLightAddUpToTheWhole) {
   const int pixels = camera.lens.width * camera.lens.height;
   for (int i = 0; i < pixels; ++i) {
     const FrameTruth& t = bounced.truth;
+    const auto x = static_cast<float>(interpolated(wall.vertices, wall, at(t.triangle, i)).x());
+    ASSERT_TRUE((at(t.albedo, i) - graded_albedo(x)).cwiseAbs().maxCoeff() <= kSingle) << i;
     const Vec3f whole = at(bounced.radiance, i);
     const Vec3f direct = at(t.diffuse, i) + Vec3f::Constant(t.specular.ptr<float>()[i]);
     const double bound = kSingle * whole.maxCoeff();
