@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <opencv2/core.hpp>
 
 #include "core/check.h"
@@ -18,9 +19,6 @@ namespace {
 constexpr double kSameNumber = 1e-6;
 // Three float32 parts, rounded once more each when they were brought to the sensor's scale.
 constexpr double kSameLight = 2e-6;
-// 16 bits a component; check of what reading normalises again, so of NaN and gross faults.
-constexpr double kUnit = 1e-4;
-
 std::set<int> first_column(const fs::path& file, const std::string& header) {
   std::set<int> numbers;
   for (const CsvLine& line : read_csv(file, header))
@@ -46,16 +44,21 @@ class SurfaceCheck {
  private:
   fs::path file(const char* name) const { return label_image(name).file(in_.layout, index_); }
 
-  // Empty where the frame has no such label, or one that cannot be read.
-  cv::Mat image(const char* name) {
-    const LabelImage& label = label_image(name);
-    if (!fs::exists(file(name))) return {};
+  // Empty where the frame has no such label, or one that cannot be read. Each file is read once.
+  cv::Mat image(const std::string& name) {
+    const auto [at, fresh] = images_.try_emplace(name);
+    if (fresh) at->second = read(label_image(name));
+    return at->second;
+  }
+  cv::Mat read(const LabelImage& label) {
+    const fs::path from = label.file(in_.layout, index_);
+    if (!fs::exists(from)) return {};
     try {
-      cv::Mat image = label.read(file(name));
+      cv::Mat image = label.read(from);
       check(image.type() == label.type && image.cols == in_.lens.width &&
                 image.rows == in_.lens.height,
-            "{}: {} x {} px of {}, expected {} x {} of {}", file(name).string(), image.cols,
-            image.rows, cv::typeToString(image.type()), in_.lens.width, in_.lens.height,
+            "{}: {} x {} px of {}, expected {} x {} of {}", from.string(), image.cols, image.rows,
+            cv::typeToString(image.type()), in_.lens.width, in_.lens.height,
             cv::typeToString(label.type));
       return image;
     } catch (const Error& error) {
@@ -135,19 +138,21 @@ class SurfaceCheck {
     });
   }
 
+  // The wall has a normal wherever it has a depth, and nowhere else.
   void check_shading_normals() {
-    const cv::Mat normals = image("shading_normals");
-    if (normals.empty()) return;
+    const cv::Mat normals = image("shading_normals"), depth = image("depth");
+    if (normals.empty() || depth.empty()) return;
     first_pixel("shading_normals", [&](int y, int x) -> std::string {
-      const cv::Vec3f& n = normals.at<cv::Vec3f>(y, x);
-      if (std::isnan(n[0]) || std::abs(cv::norm(n) - 1.0) <= kUnit) return {};
-      return fmt::format("the normal is {:g} long", cv::norm(n));
+      const bool there = !std::isnan(normals.at<cv::Vec3f>(y, x)[0]);
+      if (there == !std::isnan(depth.at<float>(y, x))) return {};
+      return there ? "there is a normal, but no depth" : "there is no normal, but a depth";
     });
   }
 
   const LabelSources& in_;
   const NamedNumbers& named_;
   int index_;
+  std::map<std::string, cv::Mat> images_;
   std::vector<LabelProblem> problems_;
 };
 

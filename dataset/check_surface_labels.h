@@ -16,8 +16,8 @@ struct NamedNumbers {
 };
 NamedNumbers read_named_numbers(const DatasetLayout& layout);
 
-/// Range against depth, unit normals, albedo between 0 and 1, light that is not negative and whose
-/// parts add up to the radiance, numbers that have a name; of the labels that the frame has.
+/// Range and shading normals against depth, albedo between 0 and 1, light that is not negative and
+/// whose parts add up to the radiance, numbers that have a name; of the labels that the frame has.
 std::vector<LabelProblem> check_surface_labels(const LabelSources& sources,
                                                const NamedNumbers& named, int index);
 

@@ -1,19 +1,14 @@
 #include "render/simulate.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <csignal>
-#include <cstdlib>
 #include <map>
 #include <opencv2/core.hpp>
 #include <set>
-#include <thread>
 
 #include "core/check.h"
 #include "core/files.h"
-#include "core/mesh_io.h"
 #include "dataset/check_dataset.h"
 #include "dataset/check_surface_labels.h"
 #include "dataset/frame_list.h"
@@ -24,78 +19,10 @@
 #include "dataset/truth.h"
 #include "dataset/writer.h"
 #include "render/isp.h"
-#include "tests/render/walls.h"
+#include "tests/render/simulate_fixture.h"
 
 namespace rugae {
 namespace {
-namespace fs = std::filesystem;
-
-// A small world in a folder of its own: a bumpy cavity, a camera, a track of seven poses.
-class Simulate : public testing::Test {
- protected:
-  void SetUp() override {
-    // A process started by a death test works in the folder of the one that started it.
-    const char* given = std::getenv("RUGAE_SIMULATE_TEST");
-    root_ = given ? fs::path(given)
-                  : fs::temp_directory_path() / fmt::format("rugae_simulate_{}", getpid());
-    setenv("RUGAE_SIMULATE_TEST", root_.c_str(), 1);
-    fs::remove_all(root_);
-    make_folder(root_);
-    write_ply(root_ / "wall.ply", test::sphere_mesh(3, 60.0, [](const Vec3& d) {
-                return 1.0 + 0.1 * std::sin(5.0 * d.x()) * std::cos(4.0 * d.y());
-              }));
-    write_atomic(root_ / "scene.yaml",
-                 "kind: mesh\nmesh: wall.ply\ntarget_edge_mm: 4\nwith_relief: false\n");
-    write_atomic(root_ / "camera.yaml",
-                 "name: small\nframes_in_paper: 6\ndiameter_mm: 4\n"
-                 "lens: {model: brown_conrady, width: 64, height: 48, horizontal_fov_deg: 90, "
-                 "k1: -0.1}\n"
-                 "vignetting: {cos4: true}\n"
-                 "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 9000, "
-                 "read_noise_e: 5, shutter: global}\n");
-    PoseTrack track;
-    for (int i = 0; i < 7; ++i)
-      track.push_back({i / 30.0, Rigid3(Quat(Eigen::AngleAxisd(0.05 * i, Vec3::UnitY())),
-                                        Vec3(3.0 * i - 9.0, 0.7 * i * i - 10.0, 1.5 * i))});
-    write_atomic(root_ / "track.txt", tum_text(track));
-    write_atomic(root_ / "path.yaml", "file: track.txt\nclearance_mm: 5\n");
-    options_.scene = (root_ / "scene.yaml").string();
-    options_.camera = (root_ / "camera.yaml").string();
-    options_.trajectory = (root_ / "path.yaml").string();
-    options_.resolution = "coarse";
-  }
-  void TearDown() override {
-    fs::remove_all(root_);
-    unsetenv("RUGAE_SIMULATE_TEST");
-  }
-
-  SimulateResult run(const std::string& folder, const SimulateOptions& options) {
-    Progress progress(Progress::Output::silent);
-    return simulate(options, root_ / folder, progress);
-  }
-  SimulateResult run(const std::string& folder) { return run(folder, options_); }
-
-  // Every file below the folder, by its bytes.
-  std::map<std::string, std::string> contents(const std::string& folder) const {
-    std::map<std::string, std::string> files;
-    for (const auto& entry : fs::recursive_directory_iterator(root_ / folder))
-      if (entry.is_regular_file())
-        files[fs::relative(entry.path(), root_ / folder).string()] = read_text(entry.path());
-    return files;
-  }
-  void expect_same(const std::string& a, const std::string& b) const {
-    const auto in_a = contents(a), in_b = contents(b);
-    EXPECT_GT(in_a.size(), 10u);
-    for (const auto& [file, bytes] : in_a) {
-      ASSERT_TRUE(in_b.contains(file)) << file;
-      EXPECT_TRUE(in_b.at(file) == bytes) << file;
-    }
-    EXPECT_EQ(in_a.size(), in_b.size());
-  }
-
-  fs::path root_;
-  SimulateOptions options_;
-};
 
 TEST_F(Simulate, WritesASoundDataset) {
   const SimulateResult result = run("a");
@@ -231,6 +158,9 @@ TEST_F(Simulate, CheckNamesThePixelOfASpoiltLabel) {
   EXPECT_EQ(spoilt("albedo", [&](cv::Mat& m) { number_at(m) = 1.5f; }),
             "there is 1.5, more than all light");
   EXPECT_EQ(spoilt("albedo", [&](cv::Mat& m) { number_at(m) = -0.5f; }), "there is -0.5");
+  EXPECT_EQ(
+      spoilt("shading_normals", [](cv::Mat& m) { m.at<cv::Vec3f>(3, 5) = cv::Vec3f::all(NAN); }),
+      "there is no normal, but a depth");
   EXPECT_EQ(spoilt("specular", [&](cv::Mat& m) { number_at(m) = NAN; }), "there is nan");
   EXPECT_TRUE(spoilt("diffuse", [&](cv::Mat& m) {
                 number_at(m) *= 1.0001f;
@@ -268,104 +198,6 @@ TEST_F(Simulate, BlurAndDefocusLeaveTheLabelsSharp) {
   EXPECT_EQ(read_text(sharp.flow(1)), read_text(soft.flow(1)));
   EXPECT_EQ(read_text(sharp.frame_list()), read_text(soft.frame_list()));  // metered on the sharp
   EXPECT_EQ(check_dataset(root_ / "soft").problems, std::vector<std::string>{});
-}
-
-TEST_F(Simulate, AKilledRunGoesOn) {
-  run("whole");
-  // As after a kill: three frames are there, a fourth was begun.
-  run("killed");
-  const DatasetLayout layout{root_ / "killed"};
-  fs::remove(layout.manifest());
-  fs::remove(layout.frame_list());
-  for (int i = 3; i < 7; ++i) fs::remove(layout.frame(i));
-  const SimulateResult result = run("killed");
-  EXPECT_EQ(result.frames + result.skipped, 7);
-  EXPECT_GE(result.frames, 4);
-  expect_same("whole", "killed");
-
-  const SimulateResult nothing_left = run("killed");
-  EXPECT_EQ(nothing_left.frames, 0);
-  EXPECT_EQ(nothing_left.skipped, 7);
-  expect_same("whole", "killed");
-}
-
-// A process of its own, killed for good in the middle of its work.
-TEST_F(Simulate, AProcessKilledInTheMiddleGoesOn) {
-  GTEST_FLAG_SET(death_test_style, "threadsafe");
-  options_.frames = 60;
-  EXPECT_EXIT(
-      {
-        const fs::path started = DatasetLayout{root_ / "killed"}.frame(4);
-        std::jthread killer([started] {
-          while (!fs::exists(started)) std::this_thread::yield();
-          kill(getpid(), SIGKILL);
-        });
-        run("killed");
-        // Too late: never reached unless sixty frames are written faster than one is noticed.
-        _exit(0);
-      },
-      testing::KilledBySignal(SIGKILL), "");
-  EXPECT_FALSE(fs::exists(DatasetLayout{root_ / "killed"}.manifest()));
-  const SimulateResult result = run("killed");
-  EXPECT_GT(result.skipped, 0);
-  EXPECT_GT(result.frames, 0);
-  run("whole");
-  expect_same("whole", "killed");
-}
-
-// Exposure that follows earlier frames: the same for any threads, after a kill, and alone.
-TEST_F(Simulate, AutomaticExposureHasTheSameBytesHoweverItIsRun) {
-  options_.render.sensor.exposure = ExposureMode::automatic;
-  options_.render.sensor.delay_frames = 1;
-  options_.frames = 12;
-  options_.threads = 1;
-  run("whole");
-  options_.threads = 2;
-  run("two");
-  expect_same("whole", "two");
-  const DatasetLayout whole{root_ / "whole"};
-  const auto list = read_frame_list(whole.frame_list());
-  options_.render.sensor.exposure = ExposureMode::per_frame;
-  run("memoryless");
-  const auto metered = read_frame_list(DatasetLayout{root_ / "memoryless"}.frame_list());
-  const auto total = [](const FrameRecord& record) { return record.exposure_s * record.gain; };
-  for (std::size_t i = 1; i < list.size(); ++i) {
-    const double expected = std::sqrt(total(list[i - 1]) * total(metered[i - 1]));
-    EXPECT_TRUE(std::abs(total(list[i]) / expected - 1.0) <= 1e-6) << i;
-    EXPECT_NE(total(list[i]), total(metered[i])) << i;
-  }
-
-  options_.render.sensor.exposure = ExposureMode::automatic;
-  options_.only_frame = 7;
-  EXPECT_EQ(run("alone").frames, 1);
-  const DatasetLayout alone{root_ / "alone"};
-  EXPECT_EQ(read_text(whole.frame(7)), read_text(alone.frame(7)));
-  EXPECT_FALSE(fs::exists(alone.frame(6)));
-}
-
-TEST_F(Simulate, AutomaticExposureGoesOnAfterAKill) {
-  GTEST_FLAG_SET(death_test_style, "threadsafe");
-  options_.render.sensor.exposure = ExposureMode::automatic;
-  options_.frames = 60;
-  EXPECT_EXIT(
-      {
-        const fs::path started = DatasetLayout{root_ / "killed"}.frame(9);
-        std::jthread killer([started] {
-          while (!fs::exists(started)) std::this_thread::yield();
-          kill(getpid(), SIGKILL);
-        });
-        run("killed");
-        _exit(0);
-      },
-      testing::KilledBySignal(SIGKILL), "");
-  const DatasetLayout killed{root_ / "killed"};
-  // also frames behind which others are there
-  for (int i : {2, 5}) fs::remove(killed.frame(i));
-  const SimulateResult result = run("killed");
-  EXPECT_GT(result.skipped, 0);
-  EXPECT_GT(result.frames, 0);
-  run("whole");
-  expect_same("whole", "killed");
 }
 
 TEST_F(Simulate, EveryOutputReadsBack) {

@@ -1,4 +1,4 @@
-// Scenes from presets, YAML files and mesh files, and what is said of broken ones.
+// Scenes from presets and YAML files, and what is said of broken ones.
 
 #include "scenes/scene.h"
 
@@ -15,104 +15,10 @@
 #include "core/presets.h"
 #include "core/yaml.h"
 #include "scenes/scene_file.h"
-#include "self_intersection.h"
+#include "tests/scenes/scene_files.h"
 
 namespace rugae {
 namespace {
-
-namespace fs = std::filesystem;
-
-class SceneFiles : public ::testing::Test {
- protected:
-  void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) /
-              ("rugae_scene_" +
-               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  std::string write(const std::string& name, const std::string& text) const {
-    write_atomic(folder_ / name, text);
-    return path(name);
-  }
-  std::string write(const std::string& name, const TriangleMesh& mesh) const {
-    write_ply(folder_ / name, mesh);
-    return path(name);
-  }
-  static Scene load(const std::string& name, const std::string& resolution = "coarse") {
-    return load_scene({.name_or_path = name, .seed = 1, .resolution = resolution, .oil = 0.0});
-  }
-  static std::string error_of(const std::string& name, const std::string& resolution = "coarse") {
-    try {
-      load(name, resolution);
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "no error";
-  }
-
- private:
-  fs::path folder_;
-};
-
-// An icosahedron, stretched: 20 triangles with edges of about 70 mm.
-TriangleMesh icosahedron(double radius_mm) {
-  const double g = 0.5 * (1.0 + std::sqrt(5.0));
-  TriangleMesh mesh;
-  mesh.vertices = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
-                   {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
-  for (Vec3& v : mesh.vertices) v *= radius_mm / std::sqrt(1.0 + g * g);
-  mesh.triangles = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
-                    {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
-                    {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
-                    {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
-  return mesh;
-}
-
-// A tube along z, open at both ends.
-TriangleMesh tube(double radius_mm, double length_mm) {
-  constexpr int kAround = 48, kAlong = 24;
-  TriangleMesh mesh;
-  for (int j = 0; j <= kAlong; ++j)
-    for (int i = 0; i < kAround; ++i) {
-      const double a = 2.0 * M_PI * i / kAround;
-      mesh.vertices.emplace_back(radius_mm * std::cos(a), radius_mm * std::sin(a),
-                                 length_mm * j / kAlong);
-    }
-  for (int j = 0; j < kAlong; ++j)
-    for (int i = 0; i < kAround; ++i) {
-      const int a = j * kAround + i, b = j * kAround + (i + 1) % kAround;
-      mesh.triangles.emplace_back(a, b, b + kAround);
-      mesh.triangles.emplace_back(a, b + kAround, a + kAround);
-    }
-  return mesh;
-}
-
-TriangleMesh inside_out(TriangleMesh mesh) {
-  for (Vec3i& t : mesh.triangles) std::swap(t[1], t[2]);
-  return mesh;
-}
-
-void expect_whole(const Scene& scene) {
-  const EdgeReport edges = inspect_edges(scene.wall);
-  EXPECT_TRUE(edges.closed());
-  EXPECT_EQ(edges.flipped, 0u);
-  EXPECT_GT(signed_volume_mm3(scene.wall), 0.0);
-  EXPECT_EQ(scene.wall.normals.size(), scene.wall.vertices.size());
-  EXPECT_EQ(scene.rest_positions.size(), scene.wall.vertices.size());
-  EXPECT_EQ(scene.regions.size(), scene.wall.vertices.size());
-}
-
-double longest_edge_mm(const TriangleMesh& mesh) {
-  double longest = 0.0;
-  for (const Vec3i& t : mesh.triangles)
-    for (int k = 0; k < 3; ++k)
-      longest = std::max(longest, (mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm());
-  return longest;
-}
 
 TEST_F(SceneFiles, ThePresetIsAStomach) {
   const Scene scene = load("stomach");
@@ -146,22 +52,6 @@ TEST_F(SceneFiles, TheMovingPresetIsTheSameStomachInMotion) {
   }
   EXPECT_TRUE(most >= 7.0 && most <= moving.motion_reach_mm) << most;
   EXPECT_TRUE(moving.motion_reach_mm <= 9.01);  // 7 mm of a wave and half a sway of 4 mm
-}
-
-TEST_F(SceneFiles, AnImportedWallMovesAlongItsOwnLongAxis) {
-  write("tube.ply", tube(20.0, 200.0));
-  const Scene scene = load(write("tube.yaml", std::string("kind: mesh\nmesh: tube.ply\n"
-                                                          "with_relief: false\n"
-                                                          "deformation: {peristalsis: true}\n")));
-  ASSERT_TRUE(scene.motion);
-  TriangleMesh wall = scene.wall;
-  scene.motion(40.0, wall.vertices);
-  double least_mm = 1e9;
-  for (std::size_t v = 0; v < wall.vertices.size(); ++v)
-    if (std::abs(wall.vertices[v].z() - 100.0) < 70.0)
-      least_mm = std::min(least_mm, wall.vertices[v].head<2>().norm());
-  EXPECT_NEAR(least_mm, 20.0 - 7.0, 1.0);  // the axis found is off the tube's by less
-  EXPECT_EQ(self_intersections(wall), 0);
 }
 
 TEST_F(SceneFiles, ADeformationOutOfRangeIsNamedByLineAndColumn) {
@@ -236,24 +126,6 @@ TEST_F(SceneFiles, LikeTakesWhatIsNotGiven) {
   EXPECT_TRUE(other.stomach.instances.polyp >= 10 && other.stomach.instances.polyp <= 20);
 }
 
-TEST_F(SceneFiles, AMeshLiesBesideTheFileThatNamesIt) {
-  fs::create_directories(path("base"));
-  write("base/ico.ply", icosahedron(60.0));
-  write("base/base.yaml", std::string("kind: mesh\nmesh: ico.ply\nwall_normals: outward\n"
-                                      "with_relief: false\nopen_ends: refuse\n"));
-  const auto mine = write("mine.yaml", std::string("like: base/base.yaml\ntarget_edge_mm: 4\n"));
-  const SceneFile read = read_scene_file(mine, 1);
-  EXPECT_EQ(read.kind, SceneKind::mesh);
-  EXPECT_EQ(read.import.wall, WallNormals::outward);
-  EXPECT_EQ(read.import.open_ends, OpenEnds::refuse);
-  EXPECT_FALSE(read.import.with_relief);
-  EXPECT_EQ(read.import.target_edge_mm, 4.0);
-  expect_whole(load(mine));
-  EXPECT_EQ(error_of(write("polyps.yaml", std::string("like: base/base.yaml\nlesions: {polyp: "
-                                                      "1}\n"))),
-            path("polyps.yaml") + ":2:10: lesions need a stomach of kind procedural");
-}
-
 TEST_F(SceneFiles, WhatIsResolvedBuildsOnNothing) {
   fs::create_directories(path("base"));
   fs::create_directories(path("elsewhere"));
@@ -312,139 +184,6 @@ TEST_F(SceneFiles, WrongLikesAreNamedByLineAndColumn) {
             path("f.yaml") + ":2:3: unknown key 'wetnes'; did you mean 'wetness'?");
   EXPECT_EQ(error_of(write("h.yaml", std::string("liek: stomach\n"))),
             path("h.yaml") + ":1:1: unknown key 'liek'; did you mean 'like'?");
-}
-
-TEST_F(SceneFiles, ACoarseMeshIsRoundedAndRefined) {
-  const auto mesh = write("ico.ply", icosahedron(60.0));
-  const auto file = write("ico.yaml", std::string("kind: mesh\nmesh: ico.ply\ntarget_edge_mm: 1.5\n"
-                                                  "with_relief: false\n"));
-  const Scene medium = load(file, "medium"), coarse = load(file);
-  expect_whole(medium);
-  EXPECT_LE(longest_edge_mm(medium.wall), 2.5 * 1.5);
-  EXPECT_NEAR(static_cast<double>(medium.wall.triangles.size()) / coarse.wall.triangles.size(), 4.0,
-              1e-9);
-  // smoothing keeps the volume and rounds the edges off
-  const double volume = signed_volume_mm3(icosahedron(60.0));
-  EXPECT_NEAR(signed_volume_mm3(medium.wall) / volume, 1.0, 0.02);
-  EXPECT_LT(bounding_box(medium.wall).sizes().x(), bounding_box(icosahedron(60.0)).sizes().x());
-  for (const Region region : medium.regions) ASSERT_EQ(region, Region::unknown);
-}
-
-TEST_F(SceneFiles, ABareMeshGetsRelief) {
-  const auto mesh = write("ico.ply", icosahedron(60.0));
-  const auto file = write("flat.yaml", std::string("kind: mesh\nmesh: ico.ply\nwith_relief: "
-                                                   "false\n"));
-  const Scene wall = load(mesh), flat = load(file);
-  expect_whole(wall);
-  ASSERT_EQ(wall.wall.vertices.size(), flat.wall.vertices.size());
-  double highest = 0.0;
-  for (std::size_t v = 0; v < wall.wall.vertices.size(); ++v)
-    highest = std::max(highest, (wall.wall.vertices[v] - flat.wall.vertices[v]).norm());
-  EXPECT_GE(highest, 2.0);
-  EXPECT_LE(highest, 4.5);
-  EXPECT_LT(signed_volume_mm3(wall.wall), signed_volume_mm3(flat.wall));  // folds point inward
-}
-
-TEST_F(SceneFiles, TheWallsSideIsFoundOrAskedFor) {
-  write("in.ply", inside_out(icosahedron(60.0)));
-  write("out.ply", icosahedron(60.0));
-  const auto scene = [&](const std::string& name, const std::string& normals) {
-    return write(name + "_" + normals + ".yaml", "kind: mesh\nmesh: " + name +
-                                                     ".ply\ntarget_edge_mm: 3\nwith_relief: "
-                                                     "false\nwall_normals: " +
-                                                     normals + "\n");
-  };
-  const Scene turned = load(scene("in", "auto"));
-  expect_whole(turned);
-  ASSERT_EQ(turned.notes.size(), 1u);
-  EXPECT_EQ(turned.notes[0], "its normals point into the cavity; turned");
-  EXPECT_TRUE(load(scene("out", "auto")).notes.empty());
-  expect_whole(load(scene("in", "inward")));
-  expect_whole(load(scene("out", "outward")));
-  EXPECT_EQ(error_of(scene("in", "outward")),
-            path("in.ply") +
-                ": the wall encloses -547.8 ml with normals outward; the other way is "
-                "meant?");
-}
-
-TEST_F(SceneFiles, OpenEndsAreCappedOrRefused) {
-  write("tube.ply", tube(25.0, 120.0));
-  const auto capped = write(
-      "capped.yaml", std::string("kind: mesh\nmesh: tube.ply\ntarget_edge_mm: 2\nwith_relief: "
-                                 "false\n"));
-  const Scene scene = load(capped);
-  expect_whole(scene);
-  EXPECT_NEAR(signed_volume_mm3(scene.wall), M_PI * 25.0 * 25.0 * 120.0, 0.03 * 235e3);
-  ASSERT_EQ(scene.notes.size(), 2u);
-  EXPECT_EQ(scene.notes[0], "open end of girth 157.0 mm at (0, 0, 0) capped");
-  EXPECT_EQ(scene.notes[1], "open end of girth 157.0 mm at (0, 0, 120) capped");
-  const auto refused = write("refused.yaml", std::string("kind: mesh\nmesh: tube.ply\nopen_ends: "
-                                                         "refuse\n"));
-  EXPECT_EQ(error_of(refused),
-            path("tube.ply") + ": the wall has 96 open edges; set open_ends: cap to close them");
-}
-
-TEST_F(SceneFiles, OnePieceOfSeveralIsTaken) {
-  TriangleMesh both = icosahedron(60.0);
-  const TriangleMesh other = tube(25.0, 120.0);
-  const int base = static_cast<int>(both.vertices.size());
-  for (const Vec3& v : other.vertices) both.vertices.push_back(v + Vec3(200, 0, 0));
-  for (const Vec3i& t : other.triangles) both.triangles.push_back(t + Vec3i::Constant(base));
-  write("both.ply", both);
-  const auto scene = [&](int component) {
-    return write(std::to_string(component) + ".yaml",
-                 "kind: mesh\nmesh: both.ply\ntarget_edge_mm: 3\nwith_relief: false\ncomponent: " +
-                     std::to_string(component) + "\n");
-  };
-  EXPECT_GT(bounding_box(load(scene(0)).wall).min().x(), 100.0);
-  const Scene ico = load(scene(1));
-  EXPECT_LT(bounding_box(ico.wall).max().x(), 100.0);
-  EXPECT_EQ(ico.notes.at(0), "piece 1 of 2 taken, 20 of 2324 triangles");
-  EXPECT_EQ(error_of(scene(2)), path("both.ply") + ": component is 2, the mesh has pieces 0 to 1");
-}
-
-TEST_F(SceneFiles, TrianglesThatWindAgainstEachOtherAreTurned) {
-  TriangleMesh mesh = icosahedron(60.0);
-  for (int t : {3, 4, 11}) std::swap(mesh.triangles[t][0], mesh.triangles[t][1]);
-  const Scene scene = load(write("mixed.ply", mesh));
-  expect_whole(scene);
-  EXPECT_EQ(scene.notes.at(0), "3 triangles turned to wind as their neighbours");
-}
-
-TEST_F(SceneFiles, BrokenMeshesAreToldInOneLine) {
-  EXPECT_EQ(error_of(path("none.ply")), path("none.ply") + ": no such mesh file");
-  EXPECT_EQ(error_of(write("points.ply",
-                           std::string("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
-                                       "property float y\nproperty float z\nelement face 0\n"
-                                       "property list uchar int vertex_indices\nend_header\n"
-                                       "0 0 0\n1 0 0\n0 1 0\n"))),
-            path("points.ply") + ": no triangles");
-  EXPECT_EQ(error_of(write("nan.ply",
-                           std::string("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
-                                       "property float y\nproperty float z\nelement face 1\n"
-                                       "property list uchar int vertex_indices\nend_header\n"
-                                       "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n"))),
-            path("nan.ply") + ": vertex 1 is not finite (1, nan, 0)");
-}
-
-TEST_F(SceneFiles, AWrongUnitIsNoticedAndTheRightOneSuggested) {
-  const double box_mm = bounding_box(icosahedron(60.0)).sizes().maxCoeff();
-  ASSERT_NEAR(box_mm, 102.1, 0.05);
-  EXPECT_EQ(error_of(write("m.ply", icosahedron(0.06))),
-            path("m.ply") +
-                ": its longest side is 0.1021 mm, expected 40 to 1000; if it is in "
-                "metres, set mm_per_unit: 1000");
-  EXPECT_EQ(error_of(write("cm.ply", icosahedron(6.0))).substr(path("cm.ply").size(), 49),
-            ": its longest side is 10.21 mm, expected 40 to 10");
-  EXPECT_EQ(error_of(write("um.ply", icosahedron(60000.0))),
-            path("um.ply") +
-                ": its longest side is 1.021e+05 mm, expected 40 to 1000; if it is in "
-                "micrometres, set mm_per_unit: 0.001");
-  const auto scaled =
-      write("m.yaml", std::string("kind: mesh\nmesh: m.ply\nmm_per_unit: 1000\ntarget_edge_mm: 2\n"
-                                  "with_relief: false\n"));
-  EXPECT_NEAR(signed_volume_mm3(load(scaled).wall) / signed_volume_mm3(icosahedron(60.0)), 1.0,
-              0.02);
 }
 
 TEST_F(SceneFiles, ValuesAreDrawnBySeedAndKept) {
