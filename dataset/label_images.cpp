@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <string_view>
 
@@ -15,24 +16,29 @@ namespace {
 
 using Set = LabelSet;
 using Truth = FrameTruth;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr LabelImage kLabels[] = {
-    {"depth", &Set::depth, &Truth::depth_mm, CV_32FC1, LabelCoding::values, "depth"},
-    {"range", &Set::range, &Truth::range_mm, CV_32FC1, LabelCoding::values, "range"},
-    {"normals", &Set::normals, &Truth::normal, CV_32FC3, LabelCoding::normals, "normal"},
+    {"depth", &Set::depth, &Truth::depth_mm, CV_32FC1, LabelCoding::values, kNone, "depth"},
+    {"range", &Set::range, &Truth::range_mm, CV_32FC1, LabelCoding::values, kNone, "range"},
+    {"normals", &Set::normals, &Truth::normal, CV_32FC3, LabelCoding::normals, kNone, "normal"},
     {"shading_normals", &Set::shading_normals, &Truth::shading_normal, CV_32FC3,
-     LabelCoding::normals, "shading normal"},
-    {"masks", &Set::masks, &Truth::masks, CV_8UC1, LabelCoding::numbers, "masks"},
-    {"flow", &Set::flow, &Truth::flow_px, CV_32FC2, LabelCoding::values, "flow"},
+     LabelCoding::normals, kNone, "shading normal"},
+    {"masks", &Set::masks, &Truth::masks, CV_8UC1, LabelCoding::numbers, 0.0, "masks"},
+    {"flow", &Set::flow, &Truth::flow_px, CV_32FC2, LabelCoding::values, kNone, "flow"},
     {"backward_flow", &Set::backward_flow, &Truth::backward_flow_px, CV_32FC2, LabelCoding::values,
-     "backward flow"},
-    {"triangles", &Set::triangles, &Truth::triangle, CV_32FC3, LabelCoding::values, "triangle"},
-    {"albedo", &Set::albedo, &Truth::albedo, CV_32FC3, LabelCoding::share, "albedo"},
-    {"diffuse", &Set::diffuse, &Truth::diffuse, CV_32FC3, LabelCoding::colour, "diffuse light"},
-    {"specular", &Set::specular, &Truth::specular, CV_32FC1, LabelCoding::values, "specular light"},
-    {"indirect", &Set::indirect, &Truth::indirect, CV_32FC3, LabelCoding::colour,
+     kNone, "backward flow"},
+    {"triangles", &Set::triangles, &Truth::triangle, CV_32FC3, LabelCoding::values, kNone,
+     "triangle"},
+    {"albedo", &Set::albedo, &Truth::albedo, CV_32FC3, LabelCoding::share, kNone, "albedo"},
+    {"diffuse", &Set::diffuse, &Truth::diffuse, CV_32FC3, LabelCoding::colour, 0.0,
+     "diffuse light"},
+    {"specular", &Set::specular, &Truth::specular, CV_32FC1, LabelCoding::values, 0.0,
+     "specular light"},
+    {"indirect", &Set::indirect, &Truth::indirect, CV_32FC3, LabelCoding::colour, 0.0,
      "light over other walls"},
-    {"regions", &Set::regions, &Truth::region, CV_8UC1, LabelCoding::numbers, "region"},
-    {"instances", &Set::instances, &Truth::instance, CV_8UC1, LabelCoding::numbers, "instance"}};
+    {"regions", &Set::regions, &Truth::region, CV_8UC1, LabelCoding::numbers, 0.0, "region"},
+    {"instances", &Set::instances, &Truth::instance, CV_8UC1, LabelCoding::numbers, 0.0,
+     "instance"}};
 
 LabelSet every(bool wanted) {
   LabelSet set;

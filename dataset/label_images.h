@@ -44,6 +44,7 @@ struct LabelImage {
   cv::Mat FrameTruth::*image;
   int type;  // OpenCV's, in memory
   LabelCoding coding;
+  double nothing;    // where the ray met no wall: not a number, or 0 for bits, numbers and light
   const char* what;  // for messages and pictures
 
   /// Flow leads from the last frame nowhere, and backward flow from the first.

@@ -1,12 +1,9 @@
 #include "render/labels.h"
 
 #include <cmath>
-#include <limits>
 
 namespace rugae {
 namespace {
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 // What flow in either direction needs of a lane.
 struct Seen {
@@ -102,13 +99,9 @@ FrameTruth empty_truth(int width, int height, bool has_previous, bool has_next,
     if (!(labels.*label.wanted)) continue;
     if (label.wanted == &LabelSet::flow && !has_next) continue;
     if (label.wanted == &LabelSet::backward_flow && !has_previous) continue;
-    truth.*label.image = cv::Mat(height, width, label.type, cv::Scalar::all(kNone));
+    truth.*label.image = cv::Mat(height, width, label.type, cv::Scalar::all(label.nothing));
   }
-  for (cv::Mat* bits : {&truth.masks, &truth.region, &truth.instance})
-    if (!bits->empty()) bits->setTo(0);
-  for (cv::Mat* light : {&truth.diffuse, &truth.specular, &truth.indirect})
-    if (!light->empty()) light->setTo(0.0);
-  truth.masks = cv::Mat(height, width, CV_8U, cv::Scalar(0));
+  if (!labels.masks) truth.masks = cv::Mat(height, width, CV_8U, cv::Scalar(0));
   return truth;
 }
 
