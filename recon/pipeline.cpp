@@ -105,7 +105,7 @@ Estimate reconstruct(const Observations& observations, const ReconOptions& optio
   // Algorithm 3: steps 2 to 6, pairs; step 7, all poses jointly.
   Followed followed =
       follow_tracks(frames, keys, options.align, options.tracks, options.seed, progress);
-  const Structure structure = build_structure(keys.frames, std::move(followed.tracks),
+  const Structure structure = build_structure(followed.keyframes, std::move(followed.tracks),
                                               frames.lens(), options.bundle, progress);
   const auto poses =
       resect_frames(frames, structure, options.align, options.bundle, options.seed, progress);
@@ -125,7 +125,7 @@ Estimate reconstruct(const Observations& observations, const ReconOptions& optio
   write_depth(layout, estimate.map, structure, observations.lens(), progress);
   if (options.pictures) {
     progress.begin("pictures");
-    const auto key_frames = spread(static_cast<int>(keys.frames.size()), kPictures);
+    const auto key_frames = spread(static_cast<int>(followed.keyframes.size()), kPictures);
     draw_preprocess(layout.pictures(), frames, spread(frames.size(), kPictures),
                     options.preprocess);
     draw_pairs(layout.pictures(), frames, followed.pairs,

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
+#include <map>
 #include <opencv2/imgproc.hpp>
 #include <unordered_map>
 
@@ -74,6 +74,14 @@ cv::Mat continued(const PairAlignment& pair, int next, cv::Size size) {
   return guess_flow(pair.moving_px, to, scale, size);
 }
 
+// Observations by frame index become observations by position among the key frames.
+void number_keyframes(std::vector<Track>& tracks, const std::vector<int>& keyframes) {
+  for (Track& track : tracks)
+    for (Track::Observation& o : track.observations)
+      o.keyframe =
+          static_cast<int>(std::ranges::lower_bound(keyframes, o.keyframe) - keyframes.begin());
+}
+
 // The flow from pair.reference to `next` likewise.
 cv::Mat continued_from(const PairAlignment& pair, int next, cv::Size size) {
   const double scale = static_cast<double>(next - pair.reference) / (pair.moving - pair.reference);
@@ -105,23 +113,21 @@ void set_rays(std::vector<Track>& tracks, const Lens& lens) {
   }
 }
 
-std::vector<Vec2> TrackChain::starts(int keyframe, const std::vector<Vec2>& fresh,
-                                     double spacing_px) {
-  if (static_cast<int>(through_.size()) <= keyframe) through_.resize(keyframe + 1);
-  std::vector<int>& through = through_[keyframe];
+std::vector<Vec2> TrackChain::starts(int frame, const std::vector<Vec2>& fresh, double spacing_px) {
+  std::vector<int>& through = through_[frame];
   Occupied occupied(spacing_px);
   std::vector<Vec2> points;
   for (const int t : through) {
     points.push_back(tracks_[t].observations.back().pixel);
     for (const auto& o : tracks_[t].observations)
-      if (o.keyframe == keyframe) points.back() = o.pixel;
+      if (o.keyframe == frame) points.back() = o.pixel;
     occupied.add(points.back());
   }
   for (const Vec2& p : fresh) {
     if (occupied.taken(p)) continue;
     occupied.add(p);
     Track track;
-    track.observations.push_back({keyframe, p});
+    track.observations.push_back({frame, p});
     through.push_back(static_cast<int>(tracks_.size()));
     tracks_.push_back(std::move(track));
     points.push_back(p);
@@ -132,7 +138,6 @@ std::vector<Vec2> TrackChain::starts(int keyframe, const std::vector<Vec2>& fres
 
 void TrackChain::add(int moving, const std::vector<int>& point_index,
                      const std::vector<Vec2>& moving_px, double spacing_px) {
-  if (static_cast<int>(through_.size()) <= moving) through_.resize(moving + 1);
   // Two tracks that ran together are one point seen twice: the second is not continued.
   Occupied occupied(0.25 * spacing_px);
   for (const int t : through_[moving])
@@ -161,54 +166,75 @@ std::vector<Track> TrackChain::finish() {
 Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
                        const AlignOptions& align_options, const TrackOptions& options,
                        std::uint64_t seed, Progress& progress) {
-  const std::vector<int>& at = keyframes.frames;
-  const int n = static_cast<int>(at.size());
   const double spacing_px = options.spacing_px * frames.lens().width / kReferenceWidth;
-  progress.begin("pairwise alignment", n);
+  progress.begin("pairwise alignment", keyframes.frames.size());
   Followed followed;
+  std::vector<int>& at = followed.keyframes;
+  at = keyframes.frames;
+  std::map<int, Frame> prepared;  // from the reference on
+  const auto load = [&](int index) -> const Frame& {
+    const auto [place, fresh] = prepared.try_emplace(index);
+    if (fresh) place->second = frames.frame(index);
+    return place->second;
+  };
   TrackChain chain;
-  std::deque<Frame> window;               // key frames k to k + neighbours
   std::optional<PairAlignment> previous;  // k - 1 to k
   int failed = 0;
-  for (int k = 0; k < n; ++k) {
-    const int count = std::min(n - 1 - k, align_options.neighbours);
-    while (static_cast<int>(window.size()) <= count)
-      window.push_back(frames.frame(at[k + static_cast<int>(window.size())]));
-    const Frame& reference = window.front();
-    const std::vector<Vec2> points = chain.starts(k, corners(reference, spacing_px), spacing_px);
-    std::vector<std::optional<PairAlignment>> found(count);
-    const auto try_to = [&](int i, const cv::Mat& guess) {
-      const AlignGuess known{points, guess, i == 0};
-      found[i] = align(reference, window[i + 1], align_options,
-                       pair_seed(seed, reference.index, window[i + 1].index), known);
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    const Frame& reference = load(at[k]);
+    const cv::Size size = reference.gray.size();
+    const std::vector<Vec2> points =
+        chain.starts(at[k], corners(reference, spacing_px), spacing_px);
+    const auto follow = [&](const Frame& moving, const cv::Mat& guess, bool affine) {
+      return align(reference, moving, align_options, pair_seed(seed, reference.index, moving.index),
+                   {points, guess, affine});
     };
-    if (count > 0) {
-      // The next key frame: whatever the motion, or else as it was before.
-      try_to(0, {});
-      if (!found[0] && previous) try_to(0, continued(*previous, at[k + 1], reference.gray.size()));
-      // Those after it: the motion to the next goes on.
-      tbb::parallel_for(1, std::max(1, count), [&](int i) {
-        if (found[0]) try_to(i, continued_from(*found[0], at[k + 1 + i], reference.gray.size()));
-        if (!found[i]) try_to(i, {});
-      });
+    // To the next key frame: whatever the motion, or else as it was before.
+    const auto follow_next = [&](const Frame& next) {
+      auto found = follow(next, {}, true);
+      if (!found && previous) found = follow(next, continued(*previous, next.index, size), true);
+      return found;
+    };
+    std::vector<std::optional<PairAlignment>> found;
+    if (k + 1 < at.size()) {
+      found.push_back(follow_next(load(at[k + 1])));
+      // Algorithm 2 goes by a flow that fast motion escapes: what it measures is then too little,
+      // and the next key frame comes too late. The one half way becomes a key frame too.
+      for (int next = at[k + 1]; !found[0] && next - at[k] > 1;) {
+        next = at[k] + (next - at[k]) / 2;
+        found[0] = follow_next(load(next));
+        if (found[0]) at.insert(at.begin() + static_cast<std::ptrdiff_t>(k) + 1, next);
+      }
     }
+    // To those after it: the motion to the next goes on.
+    const std::size_t count =
+        std::min(at.size() - 1 - k, static_cast<std::size_t>(align_options.neighbours));
+    found.resize(count);
+    for (std::size_t i = 1; i < count; ++i) load(at[k + 1 + i]);
+    tbb::parallel_for(std::size_t{1}, std::max(std::size_t{1}, count), [&](std::size_t i) {
+      const Frame& moving = prepared.at(at[k + 1 + i]);
+      if (found[0]) found[i] = follow(moving, continued_from(*found[0], moving.index, size), false);
+      if (!found[i]) found[i] = follow(moving, {}, false);
+    });
     previous.reset();
-    for (int i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
       if (!found[i]) {
         ++failed;
         continue;
       }
-      chain.add(k + 1 + i, found[i]->point_index, found[i]->moving_px, spacing_px);
+      chain.add(found[i]->moving, found[i]->point_index, found[i]->moving_px, spacing_px);
       if (i == 0) previous = found[0];
       followed.pairs.push_back(std::move(*found[i]));
     }
-    window.pop_front();
-    progress.step();
+    if (std::ranges::binary_search(keyframes.frames, at[k])) progress.step();
+    if (k + 1 < at.size()) prepared.erase(prepared.begin(), prepared.lower_bound(at[k + 1]));
   }
   followed.tracks = chain.finish();
+  number_keyframes(followed.tracks, at);
   set_rays(followed.tracks, frames.lens());
-  progress.end(fmt::format("{} pairs, {} failed, {} tracks", followed.pairs.size(), failed,
-                           followed.tracks.size()));
+  progress.end(fmt::format("{} pairs, {} failed, {} tracks, {} key frames more",
+                           followed.pairs.size(), failed, followed.tracks.size(),
+                           at.size() - keyframes.frames.size()));
   return followed;
 }
 

@@ -5,68 +5,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
-#include <string>
 
-#include "cameras/camera.h"
-#include "core/files.h"
-#include "dataset/image_io.h"
+#include "image_sequence.h"
 #include "recon/options.h"
 #include "synthetic_texture.h"
 
 namespace rugae {
 namespace {
 
-namespace fs = std::filesystem;
 using testing::draw;
 using testing::Texture;
 using testing::to_8bit;
 
-constexpr int kWidth = 320, kHeight = 240;
-
-// A plain folder of frames in which a wall moves to the right by `steps` px a frame.
-class Sequence : public ::testing::Test {
- protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              ("rugae_keyframes_" +
-               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  FrameSource source(const std::vector<double>& steps_px, const PreprocessOptions& options) {
-    const Texture texture(1, 7.0, 60.0);
-    cv::Mat wide = draw(kWidth + 400, kHeight, texture);
-    double shift = 0.0;
-    for (std::size_t i = 0; i <= steps_px.size(); ++i) {
-      if (i > 0) shift += steps_px[i - 1];
-      cv::Mat bgr;
-      const cv::Rect view(static_cast<int>(shift), 0, kWidth, kHeight);  // whole pixels
-      cv::cvtColor(to_8bit(wide(view)), bgr, cv::COLOR_GRAY2BGR);
-      write_image(folder_ / (std::to_string(i) + ".png"), bgr);
-    }
-    Lens lens;
-    lens.width = kWidth;
-    lens.height = kHeight;
-    lens.fx = lens.fy = 160.0;
-    lens.cx = 160.0;
-    lens.cy = 120.0;
-    write_atomic(folder_ / "lens.yaml", lens_yaml(lens, "test"));
-    return FrameSource(Observations::open(folder_, folder_ / "lens.yaml"), options);
-  }
-
-  static PreprocessOptions plain() {
-    PreprocessOptions options;
-    options.devignette = false;
-    return options;
-  }
-
-  fs::path folder_;
-};
+using Sequence = testing::ImageSequence;
 
 TEST_F(Sequence, AKeyFrameIsTakenWhereTheMeanFlowReachesTheThreshold) {
   // 30 px at 640 px width are 15 px here: four steps of 4 px.
@@ -120,7 +72,7 @@ TEST_F(Sequence, FramesAreWhatTheStagesMake) {
   EXPECT_EQ(frame.index, 1);
   EXPECT_EQ(frame.gray.type(), CV_8U);
   EXPECT_EQ(frame.map_bgr.type(), CV_8UC3);
-  EXPECT_EQ(cv::countNonZero(frame.valid), kWidth * kHeight);
+  EXPECT_EQ(cv::countNonZero(frame.valid), Sequence::kWidth * Sequence::kHeight);
   EXPECT_EQ(cv::norm(frame.gray, frames.gray(1), cv::NORM_INF), 0.0);
   // A lens without distortion: undistortion is the identity.
   const cv::Mat original = frames.observations().image(1);
@@ -138,15 +90,15 @@ TEST(Flow, FollowsTheWallNotTheLight) {
   // The wall moves by 24 px under a spot of light that stands still.
   const Texture texture(2, 7.0, 60.0);
   const auto picture = [&](double shift) {
-    return to_8bit(draw(kWidth, kHeight, [&](const Vec2& p) {
+    return to_8bit(draw(Sequence::kWidth, Sequence::kHeight, [&](const Vec2& p) {
       const double light = std::exp(-(p - Vec2(160, 120)).squaredNorm() / (2.0 * 60.0 * 60.0));
       return (0.1 + 0.9 * light) * texture(p + Vec2(shift, 0.0));
     }));
   };
   const cv::Mat flow = farneback_flow(picture(0.0), picture(24.0));
   std::vector<double> errors;
-  for (int y = 20; y < kHeight - 20; y += 5)
-    for (int x = 50; x < kWidth - 50; x += 5)
+  for (int y = 20; y < Sequence::kHeight - 20; y += 5)
+    for (int x = 50; x < Sequence::kWidth - 50; x += 5)
       errors.push_back(cv::norm(flow.at<cv::Vec2f>(y, x) - cv::Vec2f(-24.0F, 0.0F)));
   std::sort(errors.begin(), errors.end());
   EXPECT_TRUE(errors[errors.size() / 2] <= 0.3) << errors[errors.size() / 2];
