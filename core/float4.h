@@ -28,6 +28,7 @@ inline Float4 select(Float4 mask, Float4 a, Float4 b) {
 }
 inline Float4 above(Float4 a, Float4 b) { return _mm_cmpgt_ps(a, b); }
 inline bool any(Float4 mask) { return _mm_movemask_ps(mask) != 0; }
+inline bool all(Float4 mask) { return _mm_movemask_ps(mask) == 15; }
 
 inline Float4x3 operator+(const Float4x3& a, const Float4x3& b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z};

@@ -58,7 +58,7 @@ NormalTable::NormalTable() {
   constexpr int kOctaves = 31 - kSplit;  // of tails from 2^kSplit to 2^31
   pieces_.resize(static_cast<std::size_t>(kOctaves + 1) << kSplit);
   for (std::uint32_t tail = 0; tail < kFirst; ++tail)
-    pieces_[tail] = {static_cast<float>(normal_quantile((tail + 0.5) * 0x1p-32)), 0, 0, 0};
+    pieces_[tail] = {{static_cast<float>(normal_quantile((tail + 0.5) * 0x1p-32)), 0, 0, 0}};
   for (int shift = 0; shift < kOctaves; ++shift)
     for (int i = 0; i < kFirst; ++i) {
       const double start = static_cast<double>(static_cast<std::uint64_t>(kFirst + i) << shift);
@@ -71,8 +71,8 @@ NormalTable::NormalTable() {
                    d3 = z[3] - 3 * z[2] + 3 * z[1] - z[0];
       // With s = 3 t: z0 + d1 s + d2 s (s - 1) / 2 + d3 s (s - 1) (s - 2) / 6
       pieces_[((shift + 1) << kSplit) + i] = {
-          static_cast<float>(z[0]), static_cast<float>(3.0 * (d1 - d2 / 2.0 + d3 / 3.0)),
-          static_cast<float>(9.0 * (d2 / 2.0 - d3 / 2.0)), static_cast<float>(27.0 * d3 / 6.0)};
+          {static_cast<float>(z[0]), static_cast<float>(3.0 * (d1 - d2 / 2.0 + d3 / 3.0)),
+           static_cast<float>(9.0 * (d2 / 2.0 - d3 / 2.0)), static_cast<float>(27.0 * d3 / 6.0)}};
     }
 }
 

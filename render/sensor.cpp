@@ -8,6 +8,7 @@
 
 #include "core/check.h"
 #include "core/random.h"
+#include "core/random4.h"
 #include "core/types.h"
 #include "dataset/layout.h"
 #include "render/isp.h"
@@ -19,6 +20,16 @@ namespace {
 // Of a random number's index: the pixel below bit 40, then what it is for, then the camera.
 constexpr std::uint64_t kOffsetPattern = 1ull << 40;
 constexpr int kCameraBits = 48;
+constexpr int kFour = 4;  // pixels at once
+
+// The last one again where there are fewer than four.
+Float4x3 gathered(const Vec3f* light, int count) {
+  const auto channel = [&](int c) {
+    const auto of = [&](int k) { return light[std::min(k, count - 1)][c]; };
+    return _mm_setr_ps(of(0), of(1), of(2), of(3));
+  };
+  return {channel(0), channel(1), channel(2)};
+}
 
 const Sensor& checked(const Sensor& sensor) {
   check(sensor.bit_depth >= 8 && sensor.bit_depth <= 16, "sensor: {} bits, expected 8 to 16",
@@ -40,46 +51,6 @@ void for_rows(int rows, std::atomic<double>* time_s, const auto& one_row) {
 }
 
 }  // namespace
-
-// w = z + g1 (z^2 - 1) / 6 + g2 (z^3 - 3 z) / 24 - g1^2 (2 z^3 - 5 z) / 36 with skewness
-// g1 = m / s^3 and excess g2 = m / s^4; electrons = m + s w.
-float ElectronNoise::smooth(float mean_e, float z) const {
-  const float variance = mean_e + static_cast<float>(read_e_ * read_e_);
-  const float s = std::sqrt(variance), inverse = 1.0f / variance;
-  const float excess = mean_e * inverse * inverse, skew = excess * s;
-  const float z2 = z * z;
-  const float w = z + skew * (z2 - 1.0f) * (1.0f / 6.0f) +
-                  z * (excess * (z2 - 3.0f) * (1.0f / 24.0f) -
-                       skew * skew * (2.0f * z2 - 5.0f) * (1.0f / 36.0f));
-  return mean_e + s * w;
-}
-
-std::array<float, 3> ElectronNoise::operator()(const std::array<float, 3>& mean_e,
-                                               std::uint32_t frame, std::uint64_t pixel) const {
-  const auto words = random_words(seed_, Purpose::shot_noise, frame, pixel);
-  const auto read2 = static_cast<float>(read_e_ * read_e_);
-  const float least = *std::ranges::min_element(mean_e);
-  std::array<float, 3> electrons;
-  if (least + read2 >= static_cast<float>(kSmoothVariance) && read2 >= 1.0f) {
-    for (int c = 0; c < 3; ++c) electrons[c] = smooth(mean_e[c], normal_(words[c]));
-    return electrons;
-  }
-  const auto fraction_words = random_words(seed_, Purpose::shot_noise, frame, pixel | (1ull << 40));
-  const auto read_words = random_words(seed_, Purpose::read_noise, frame, pixel);
-  for (int c = 0; c < 3; ++c) {
-    const float mean = std::max(0.0f, mean_e[c]);
-    float shot;
-    if (mean < PoissonTable::kExactBelow) {
-      shot = static_cast<float>(poisson_(mean, words[c], fraction_words[c]));
-    } else {
-      const float s = std::sqrt(mean), z = normal_(words[c]), z2 = z * z;
-      shot = std::floor(mean + s * z + (z2 - 1.0f) * (1.0f / 6.0f) - (z2 * z - z) / (72.0f * s) +
-                        0.5f);
-    }
-    electrons[c] = shot + static_cast<float>(read_e_) * normal_(read_words[c]);
-  }
-  return electrons;
-}
 
 SensorModel::SensorModel(const Sensor& sensor, const SensorOptions& options)
     : sensor_(sensor),
@@ -115,32 +86,34 @@ float SensorModel::numbers_per_electron(const Exposure& exposure) const {
   return static_cast<float>(exposure.gain * (adc_top_ - sensor_.black_level) / sensor_.full_well_e);
 }
 
-int SensorModel::adc(float electrons, float numbers_per_electron) const {
-  const float number =
-      electrons * numbers_per_electron + static_cast<float>(sensor_.black_level) + 0.5f;
-  if (!(number > 0.0f)) return 0;
-  return number >= static_cast<float>(adc_top_) ? adc_top_ : static_cast<int>(number);
+int SensorModel::adc(float electrons, const Exposure& exposure) const {
+  return _mm_cvtsi128_si32(adc(splat(electrons), numbers_per_electron(exposure)));
+}
+
+__m128i SensorModel::adc(Float4 electrons, float numbers_per_electron) const {
+  const Float4 number = electrons * splat(numbers_per_electron) +
+                        splat(static_cast<float>(sensor_.black_level)) + splat(0.5f);
+  // the maximum with NaN is its second argument
+  return _mm_cvttps_epi32(min(max(number, _mm_setzero_ps()), splat(static_cast<float>(adc_top_))));
 }
 
 // electrons = Poisson(mean (1 + prnu g)) + Normal(0, read noise) + dsnu h, g and h standard normal
 // numbers of the photosite, the same in every frame.
-std::array<float, 3> SensorModel::measure(const Vec3f& light, float to_electrons, int frame,
-                                          std::uint64_t pixel) const {
-  std::array<float, 3> e = {light[0] * to_electrons, light[1] * to_electrons,
-                            light[2] * to_electrons};
+Float4x3 SensorModel::measure(const Float4x3& mean_e, int frame, std::uint64_t pixel) const {
   const SensorSettings& chain = options_.chain;
+  const auto pattern = [&](std::uint64_t first) {
+    const auto words = random_words_of_four(options_.seed, Purpose::fixed_pattern, 0, first);
+    return Float4x3{normal_(words.word[0]), normal_(words.word[1]), normal_(words.word[2])};
+  };
+  Float4x3 e = mean_e;
   if (chain.prnu) {
-    const auto words = random_words(options_.seed, Purpose::fixed_pattern, 0, pixel);
-    const auto share = static_cast<float>(sensor_.prnu);
-    for (int c = 0; c < 3; ++c) e[c] *= std::max(0.0f, 1.0f + share * normal_(words[c]));
+    const Float4 share = splat(static_cast<float>(sensor_.prnu));
+    const auto gain = [share](Float4 g) { return max(splat(1.0f) + share * g, _mm_setzero_ps()); };
+    const Float4x3 g = pattern(pixel);
+    e = {e.x * gain(g.x), e.y * gain(g.y), e.z * gain(g.z)};
   }
   if (chain.noise) e = noise_(e, static_cast<std::uint32_t>(frame), pixel);
-  if (chain.dsnu) {
-    const auto words =
-        random_words(options_.seed, Purpose::fixed_pattern, 0, pixel | kOffsetPattern);
-    const auto spread_e = static_cast<float>(sensor_.dsnu_e);
-    for (int c = 0; c < 3; ++c) e[c] += spread_e * normal_(words[c]);
-  }
+  if (chain.dsnu) e = e + pattern(pixel | kOffsetPattern) * static_cast<float>(sensor_.dsnu_e);
   return e;
 }
 
@@ -184,22 +157,32 @@ SensorImages SensorModel::digitise(const cv::Mat& radiance, const Exposure& expo
   const auto expose_row = [&](int y) {
     const auto* in = radiance.ptr<Vec3f>(y);
     auto* mask = masks.ptr<unsigned char>(y);
-    for (int x = 0; x < radiance.cols; ++x) {
-      const auto e = measure(in[x], to_electrons, frame,
-                             first + static_cast<std::uint64_t>(y) * radiance.cols + x);
-      if (bayer != Bayer::none) {
-        const int number = adc(e[bayer_channel(bayer, x, y)], to_numbers);
-        images.mosaic.ptr<std::uint16_t>(y)[x] = static_cast<std::uint16_t>(number);
-        if (number == adc_top_) mask[x] |= kMaskSaturated;
-        continue;
-      }
-      auto& out = images.bgr.ptr<cv::Vec3b>(y)[x];
-      for (int c = 0; c < 3; ++c) {
-        const int number = adc(e[c], to_numbers);
-        out[2 - c] = table(c, number);
-        if (number == adc_top_) mask[x] |= kMaskSaturated;
-        if (keep_adc)
-          images.adc_bgr.ptr<cv::Vec3w>(y)[x][2 - c] = static_cast<std::uint16_t>(number);
+    alignas(16) std::array<std::array<std::int32_t, kFour>, 3> numbers;
+    for (int x = 0; x < radiance.cols; x += kFour) {
+      const int count = std::min(kFour, radiance.cols - x);
+      const std::uint64_t pixel = first + static_cast<std::uint64_t>(y) * radiance.cols + x;
+      const Float4x3 e = measure(gathered(in + x, count) * to_electrons, frame, pixel);
+      const auto convert = [&](Float4 electrons, int c) {
+        _mm_store_si128(reinterpret_cast<__m128i*>(numbers[c].data()), adc(electrons, to_numbers));
+      };
+      convert(e.x, 0);
+      convert(e.y, 1);
+      convert(e.z, 2);
+      for (int k = 0; k < count; ++k) {
+        if (bayer != Bayer::none) {
+          const int number = numbers[bayer_channel(bayer, x + k, y)][k];
+          images.mosaic.ptr<std::uint16_t>(y)[x + k] = static_cast<std::uint16_t>(number);
+          if (number == adc_top_) mask[x + k] |= kMaskSaturated;
+          continue;
+        }
+        auto& out = images.bgr.ptr<cv::Vec3b>(y)[x + k];
+        for (int c = 0; c < 3; ++c) {
+          out[2 - c] = table(c, numbers[c][k]);
+          if (numbers[c][k] == adc_top_) mask[x + k] |= kMaskSaturated;
+          if (keep_adc)
+            images.adc_bgr.ptr<cv::Vec3w>(y)[x + k][2 - c] =
+                static_cast<std::uint16_t>(numbers[c][k]);
+        }
       }
     }
   };

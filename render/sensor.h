@@ -7,8 +7,8 @@
 #include <opencv2/core/mat.hpp>
 
 #include "cameras/camera.h"
+#include "render/electron_noise.h"
 #include "render/metering.h"
-#include "render/noise.h"
 
 namespace rugae {
 
@@ -18,30 +18,6 @@ struct SensorOptions {
   std::uint64_t seed = 1;
   std::uint32_t camera = 0;  // cameras of one seed have noise and patterns of their own
   cv::Mat blanked = {};      // CV_8U, 255 where the camera makes its pixels black; may be empty
-};
-
-/// Electrons of a pixel: Poisson of the mean, plus normal read noise.
-///
-/// Where the variance is at least kSmoothVariance and the read noise at least one electron, so that
-/// single electrons cannot be told apart, both are drawn by one normal number z through the
-/// expansion of Cornish and Fisher with the sum's exact first four cumulants (mean, mean + read^2,
-/// mean, mean; Abramowitz and Stegun 26.2.49): the terms left out are below 1e-3 of a standard
-/// deviation. Elsewhere the Poisson number is drawn by exact inversion (rounded Cornish-Fisher
-/// above 64 electrons) and the read noise by a number of its own.
-class ElectronNoise {
- public:
-  ElectronNoise(double read_noise_e, std::uint64_t seed) : read_e_(read_noise_e), seed_(seed) {}
-  /// Electrons of the three channels of a pixel with the given means.
-  std::array<float, 3> operator()(const std::array<float, 3>& mean_e, std::uint32_t frame,
-                                  std::uint64_t pixel) const;
-  static constexpr double kSmoothVariance = 64.0;
-
- private:
-  float smooth(float mean_e, float z) const;
-  double read_e_;
-  std::uint64_t seed_;
-  NormalTable normal_;
-  PoissonTable poisson_;
 };
 
 /// The pixels whose centres the field stop covers, for SensorOptions; empty when it covers none.
@@ -69,9 +45,7 @@ class SensorModel {
   /// CV_32FC3, RGB: the light in units of the ADC's full scale, not clipped.
   cv::Mat relative(const cv::Mat& radiance, const Exposure& exposure) const;
   /// The ADC's number for electrons, round half up, clipped to its range.
-  int adc(float electrons, const Exposure& exposure) const {
-    return adc(electrons, numbers_per_electron(exposure));
-  }
+  int adc(float electrons, const Exposure& exposure) const;
   /// The 8-bit value of an ADC number (without white balance).
   unsigned char display(int adc) const { return display_(1, adc); }
   int adc_top() const { return adc_top_; }
@@ -86,9 +60,9 @@ class SensorModel {
 
  private:
   float numbers_per_electron(const Exposure& exposure) const;
-  int adc(float electrons, float numbers_per_electron) const;
-  std::array<float, 3> measure(const Vec3f& light, float to_electrons, int frame,
-                               std::uint64_t pixel) const;
+  __m128i adc(Float4 electrons, float numbers_per_electron) const;
+  // Electrons of the four pixels from `pixel` on, a lane each.
+  Float4x3 measure(const Float4x3& mean_e, int frame, std::uint64_t pixel) const;
   void blank(SensorImages& images, cv::Mat& masks) const;
   DisplayTable table_for(const cv::Mat& radiance, const Exposure& exposure) const;
 

@@ -1,4 +1,5 @@
 #include "core/random.h"
+#include "core/random4.h"
 
 #include <gtest/gtest.h>
 
@@ -18,6 +19,20 @@ TEST(Random, KnownAnswerOfPhilox) {
   EXPECT_EQ(words[1], 0x94fdccebu);
   EXPECT_EQ(words[2], 0x5001e420u);
   EXPECT_EQ(words[3], 0x24126ea1u);
+}
+
+TEST(Random, FourAtOnceAreTheSameWords) {
+  for (const std::uint64_t index : {0ull, 5ull, (3ull << 48) + (1ull << 40) + 307196ull}) {
+    const auto four = random_words_of_four(0x0123456789abcdefull, Purpose::test, 77, index);
+    for (std::uint64_t k = 0; k < 4; ++k) {
+      const auto one = random_words(0x0123456789abcdefull, Purpose::test, 77, index + k);
+      for (int w = 0; w < 4; ++w) {
+        alignas(16) std::uint32_t lanes[4];
+        _mm_store_si128(reinterpret_cast<__m128i*>(lanes), four.word[w]);
+        EXPECT_EQ(lanes[k], one[w]) << index << ", word " << w << " of the " << k << "th after it";
+      }
+    }
+  }
 }
 
 TEST(Random, EveryPartOfTheKeyMatters) {

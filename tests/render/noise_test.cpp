@@ -1,3 +1,4 @@
+#include "render/electron_noise.h"
 #include "render/noise.h"
 
 #include <gtest/gtest.h>
@@ -144,6 +145,44 @@ TEST(Noise, IsAFunctionOfSeedFrameAndPixel) {
   const auto e = a(mean, 3, 77);
   EXPECT_NE(e[0], e[1]);
   EXPECT_NE(e[1], e[2]);
+}
+
+// Every octave of the table, its ends, and the numbers that have no octave.
+TEST(Noise, FourNormalNumbersAreTheSame) {
+  const NormalTable normal;
+  std::vector<std::uint32_t> words = {0, 1, 15, 16, 17, 31, 32, 33, 0x7fffffff, 0x80000000, ~0u};
+  for (int bit = 4; bit < 31; ++bit)
+    for (const std::uint32_t beside : {0u, 1u, ~0u})
+      for (const std::uint32_t sign : {0u, 1u << 31}) words.push_back(((1u << bit) + beside) | sign);
+  for (std::uint64_t i = 0; i < 1000; ++i)
+    words.push_back(random_words(5, Purpose::test, 0, i)[0] >> (i % 32));
+  while (words.size() % 4 != 0) words.push_back(0);
+  for (std::size_t i = 0; i < words.size(); i += 4) {
+    alignas(16) float four[4];
+    _mm_store_ps(four, normal(_mm_loadu_si128(reinterpret_cast<const __m128i*>(&words[i]))));
+    for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(four[k], normal(words[i + k])) << words[i + k];
+  }
+}
+
+// Bright pixels and dark ones, side by side and alone.
+TEST(Noise, FourPixelsAreTheSame) {
+  for (const double read_e : {0.3, 10.0}) {
+    const ElectronNoise noise(read_e, 3);
+    for (const float dark_e : {0.0f, 5.0f, 70.0f, 500.0f, -1.0f}) {
+      alignas(16) const float mean[3][4] = {
+          {900.0f, 700.0f, dark_e, 5000.0f}, {200.0f, dark_e, 100.0f, 90.0f}, {80, 400, 80, 300}};
+      const Float4x3 electrons =
+          noise({_mm_load_ps(mean[0]), _mm_load_ps(mean[1]), _mm_load_ps(mean[2])}, 9, 1234);
+      alignas(16) float four[3][4];
+      _mm_store_ps(four[0], electrons.x);
+      _mm_store_ps(four[1], electrons.y);
+      _mm_store_ps(four[2], electrons.z);
+      for (std::size_t k = 0; k < 4; ++k) {
+        const auto one = noise({mean[0][k], mean[1][k], mean[2][k]}, 9, 1234 + k);
+        for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(four[c][k], one[c]) << dark_e;
+      }
+    }
+  }
 }
 
 }  // namespace
