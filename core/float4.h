@@ -5,6 +5,8 @@
 
 #include <emmintrin.h>
 
+#include <cmath>
+
 #include "core/types.h"
 
 namespace rugae {
@@ -26,6 +28,13 @@ inline Float4 clamp01(Float4 v) { return min(max(v, _mm_setzero_ps()), splat(1.0
 inline Float4 select(Float4 mask, Float4 a, Float4 b) {
   return _mm_or_ps(_mm_and_ps(mask, a), _mm_andnot_ps(mask, b));
 }
+inline Float4 root(Float4 v) { return _mm_sqrt_ps(v); }
+inline float root(float v) { return std::sqrt(v); }
+/// `v` where x > 0 (false for NaN), 0 elsewhere; of one number or four.
+inline Float4 where_positive(Float4 x, Float4 v) {
+  return _mm_and_ps(_mm_cmpgt_ps(x, _mm_setzero_ps()), v);
+}
+inline float where_positive(float x, float v) { return x > 0.0f ? v : 0.0f; }
 inline Float4 above(Float4 a, Float4 b) { return _mm_cmpgt_ps(a, b); }
 inline bool any(Float4 mask) { return _mm_movemask_ps(mask) != 0; }
 inline bool all(Float4 mask) { return _mm_movemask_ps(mask) == 15; }

@@ -11,6 +11,7 @@
 
 #include <cmath>
 
+#include "core/float4.h"
 #include "core/types.h"
 #include "core/units.h"
 
@@ -43,19 +44,21 @@ double visible_facet_pdf(double alpha, const Vec3& out, const Vec3& half);
 /// Light and eye in one place, in = out: what the frames use. Both times cos_i, so that
 /// radiance = value * I / d^2. Half vector and direction are the same, so F is F0 and
 ///   coat cos = coverage D(c) F0 / (4 sqrt(c^2 + alpha^2 (1 - c^2))).
-inline float coat_retro(float cosine, float alpha, float coverage, float f0) {
-  if (!(cosine > 0.0f)) return 0.0f;
-  const float a2 = alpha * alpha, c2 = cosine * cosine;
-  const float d = c2 * (a2 - 1.0f) + 1.0f;
-  const float distribution = a2 / (static_cast<float>(kPi) * d * d);
-  return coverage * distribution * f0 / (4.0f * std::sqrt(c2 + a2 * (1.0f - c2)));
+/// For one number or four (float or Float4).
+template <typename T>
+T coat_retro(T cosine, T alpha, T coverage, T f0) {
+  const T a2 = alpha * alpha, c2 = cosine * cosine;
+  const T d = c2 * (a2 - 1.0f) + 1.0f;
+  const T distribution = a2 / (static_cast<float>(kPi) * d * d);
+  return where_positive(cosine,
+                        coverage * distribution * f0 / (4.0f * root(c2 + a2 * (1.0f - c2))));
 }
 /// Times albedo.
-inline float wall_retro(float cosine, float coverage, float f0) {
-  if (!(cosine > 0.0f)) return 0.0f;
-  const float m = 1.0f - cosine, m2 = m * m;
-  const float through = 1.0f - coverage * (f0 + (1.0f - f0) * m2 * m2 * m);
-  return through * through * cosine * static_cast<float>(1.0 / kPi);
+template <typename T>
+T wall_retro(T cosine, T coverage, T f0) {
+  const T m = 1.0f - cosine, m2 = m * m;
+  const T through = 1.0f - coverage * (f0 + (1.0f - f0) * m2 * m2 * m);
+  return where_positive(cosine, through * through * cosine * static_cast<float>(1.0 / kPi));
 }
 
 }  // namespace rugae

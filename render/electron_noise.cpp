@@ -9,9 +9,6 @@
 namespace rugae {
 namespace {
 
-float root(float v) { return std::sqrt(v); }
-Float4 root(Float4 v) { return _mm_sqrt_ps(v); }
-
 // w = z + g1 (z^2 - 1) / 6 + g2 (z^3 - 3 z) / 24 - g1^2 (2 z^3 - 5 z) / 36 with skewness
 // g1 = m / s^3 and excess g2 = m / s^4; electrons = m + s w. For one number or four.
 template <typename T>
@@ -76,8 +73,8 @@ Float4x3 ElectronNoise::operator()(const Float4x3& mean_e, std::uint32_t frame,
   alignas(16) float mean[3][4], out[3][4];
   to_lanes(mean_e, mean);
   for (int k = 0; k < 4; ++k) {
-    const auto e =
-        (*this)({mean[0][k], mean[1][k], mean[2][k]}, frame, pixel + static_cast<std::uint64_t>(k));
+    const std::array<float, 3> of_pixel = {mean[0][k], mean[1][k], mean[2][k]};
+    const auto e = (*this)(of_pixel, frame, pixel + static_cast<std::uint64_t>(k));
     for (int c = 0; c < 3; ++c) out[c][k] = e[c];
   }
   return {_mm_load_ps(out[0]), _mm_load_ps(out[1]), _mm_load_ps(out[2])};

@@ -8,31 +8,47 @@
 namespace rugae {
 namespace {
 
+// Lanes up to a multiple of four.
+int in_fours(int count) { return (count + 3) / 4 * 4; }
+
 // L = (wall_retro albedo + coat_retro) I / d^2. The wet layer has its own normal,
 // n_coat = normalize(n - g_tangential) with g the slope of its height.
 void add_central_light(const Emitter& light, const Tile& tile, const SurfaceTile& surface,
                        RadianceTile& radiance) {
-  Lanes<float> cosine, coat_cosine, irradiance;
+  alignas(16) Lanes<float> cosine, coat_dot, tilted2, irradiance, roughness, coverage, f0;
   for (int k = 0; k < surface.count; ++k) {
     const int lane = surface.lane[k];
     const Vec3f to_camera = -tile.direction_world[lane].cast<float>();
     const Vec3f& n = surface.shading_normal[k];
-    const Vec3f& g = surface.material[k].coat_gradient;
+    const MucosaSample& m = surface.material[k];
+    const Vec3f& g = m.coat_gradient;
     const Vec3f tilted = n - (g - n * n.dot(g));
     cosine[k] = n.dot(to_camera);
-    coat_cosine[k] = tilted.dot(to_camera) / std::sqrt(tilted.squaredNorm());
+    coat_dot[k] = tilted.dot(to_camera);
+    tilted2[k] = tilted.squaredNorm();
+    roughness[k] = m.roughness;
+    coverage[k] = m.coverage;
+    f0[k] = m.f0;
     const double range_mm = tile.hit[lane].range_mm;
-    const Vec3 axis = tile.instant_of(lane).world_from_camera * light.axis;
-    irradiance[k] = static_cast<float>(light.intensity *
-                                       lobe_share(light, axis.dot(tile.direction_world[lane])) /
-                                       (range_mm * range_mm));
+    double share = 1.0;
+    if (light.lobe > 0.0) {
+      const Vec3 axis = tile.instant_of(lane).world_from_camera * light.axis;
+      share = lobe_share(light, axis.dot(tile.direction_world[lane]));
+    }
+    irradiance[k] = static_cast<float>(light.intensity * share / (range_mm * range_mm));
   }
-  for (int k = 0; k < surface.count; ++k) {
-    const MucosaSample& m = surface.material[k];
-    radiance.wall[k] += irradiance[k] * wall_retro(cosine[k], m.coverage, m.f0);
+  for (auto* lanes : {&cosine, &coat_dot, &tilted2, &irradiance, &roughness, &coverage, &f0})
+    std::fill(lanes->begin() + surface.count, lanes->begin() + in_fours(surface.count), 1.0f);
+  for (int k = 0; k < surface.count; k += 4) {
+    const auto of = [k](const Lanes<float>& lanes) { return _mm_load_ps(&lanes[k]); };
+    const auto add = [k](Lanes<float>& sum, Float4 v) {
+      _mm_store_ps(&sum[k], _mm_load_ps(&sum[k]) + v);
+    };
+    const Float4 wet = of(coverage), fresnel = of(f0), facing = of(cosine);
+    add(radiance.wall, of(irradiance) * wall_retro(facing, wet, fresnel));
     // A coat turned to the light where the wall itself is turned away gives nothing.
-    if (cosine[k] > 0.0f)
-      radiance.coat[k] += irradiance[k] * coat_retro(coat_cosine[k], m.roughness, m.coverage, m.f0);
+    const Float4 coat = coat_retro(of(coat_dot) / root(of(tilted2)), of(roughness), wet, fresnel);
+    add(radiance.coat, of(irradiance) * where_positive(facing, coat));
   }
 }
 
@@ -73,8 +89,8 @@ void add_offset_light(const Emitter& light, const Wall& wall, const Tile& tile,
 
 void shade(std::span<const Emitter> lights, const Wall& wall, const Tile& tile,
            const SurfaceTile& surface, RadianceTile& radiance) {
-  std::fill_n(radiance.wall.begin(), surface.count, 0.0f);
-  std::fill_n(radiance.coat.begin(), surface.count, 0.0f);
+  std::fill_n(radiance.wall.begin(), in_fours(surface.count), 0.0f);
+  std::fill_n(radiance.coat.begin(), in_fours(surface.count), 0.0f);
   for (const Emitter& light : lights) {
     if (light.central())
       add_central_light(light, tile, surface, radiance);

@@ -11,8 +11,8 @@ namespace rugae {
 /// Linear radiance towards the camera of the lanes of a SurfaceTile, split by origin:
 /// RGB = wall albedo + coat.
 struct RadianceTile {
-  Lanes<float> wall;  // for an albedo of 1
-  Lanes<float> coat;  // of the wet layer, the same in every channel
+  alignas(16) Lanes<float> wall;  // for an albedo of 1
+  alignas(16) Lanes<float> coat;  // of the wet layer, the same in every channel
 };
 
 /// Direct light of all emitters. One at the camera's centre lights what the camera sees; for the

@@ -48,7 +48,7 @@ class Surface {
 
   const TriangleMesh& wall() const { return *wall_; }
   /// Unit geometric normal by the winding, world axes; zero for a triangle without area.
-  const Vec3f& geometric_normal(int triangle) const { return triangle_normals_[triangle]; }
+  Vec3f geometric_normal(int triangle) const { return triangle_normals_[triangle].head<3>(); }
   /// Works out every lane that met the wall. Where it was met within a footprint of the point that
   /// `known` has for the pixel, that material is taken; `known` is empty or has one entry a pixel.
   void look_up(const Tile& tile, const RayTable& rays, SurfaceTile& surface,
@@ -58,19 +58,24 @@ class Surface {
   void look_up(const Tile& tile, const Lanes<float>& spread_rad, SurfaceTile& surface) const;
 
  private:
-  struct Vertex {
-    Vec3f normal, rest_position_mm;
+  // Two registers, half a cache line.
+  struct alignas(32) Vertex {
+    Vec3f normal;
     Region region;
+    Vec3f rest_position_mm;
+    float unused = 0.0f;
   };
   void find_triangle_normals();
   // All of a SurfaceTile but the materials.
   void look_up_shape(const Tile& tile, const Lanes<float>& spread_rad, SurfaceTile& surface) const;
+  void look_up_four(const Tile& tile, const Lanes<float>& spread_rad, int k,
+                    SurfaceTile& surface) const;
   void pack(const std::vector<Vec3>& rest_positions, const std::vector<Region>& regions);
 
   const TriangleMesh* wall_;
   Material material_;
   std::vector<Vertex> vertices_;
-  std::vector<Vec3f> triangle_normals_;
+  std::vector<Eigen::Vector4f> triangle_normals_;  // and 0: a register each
 };
 
 }  // namespace rugae

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 #include "core/check.h"
@@ -65,21 +66,24 @@ struct Mucosa::FourPlaces {
   Float4x3 p, normal;
   Float4 footprint_mm, squamous;  // the latter a mask
 
-  explicit FourPlaces(std::span<const MucosaPlace> places) {
-    alignas(16) float v[8][kFour];
-    for (std::size_t k = 0; k < kFour; ++k) {
-      const MucosaPlace& from = places[std::min(k, places.size() - 1)];
-      for (int a = 0; a < 3; ++a) {
-        v[a][k] = from.rest_position_mm[a];
-        v[3 + a][k] = from.normal[a];
-      }
-      v[6][k] = from.footprint_mm;
-      v[7][k] = from.region == Region::oesophagus ? 1.0f : 0.0f;
-    }
-    p = {_mm_load_ps(v[0]), _mm_load_ps(v[1]), _mm_load_ps(v[2])};
-    normal = {_mm_load_ps(v[3]), _mm_load_ps(v[4]), _mm_load_ps(v[5])};
-    footprint_mm = _mm_load_ps(v[6]);
-    squamous = above(_mm_load_ps(v[7]), _mm_setzero_ps());
+  FourPlaces() {}  // filled by take
+  void take(std::span<const MucosaPlace> places) {
+    // A place is two registers: position and normal's x, and the rest.
+    static_assert(sizeof(MucosaPlace) == 32 && offsetof(MucosaPlace, normal) == 12 &&
+                  offsetof(MucosaPlace, region) == 24 && sizeof(Region) == 1 &&
+                  offsetof(MucosaPlace, footprint_mm) == 28);
+    const auto half = [&](std::size_t k, int which) {
+      return _mm_loadu_ps(places[std::min(k, places.size() - 1)].rest_position_mm.data() +
+                          4 * which);
+    };
+    const Float4x4 first = transposed(half(0, 0), half(1, 0), half(2, 0), half(3, 0));
+    const Float4x4 second = transposed(half(0, 1), half(1, 1), half(2, 1), half(3, 1));
+    p = first3(first);
+    normal = {first.w, second.x, second.y};
+    const __m128i region = _mm_and_si128(_mm_castps_si128(second.z), _mm_set1_epi32(0xff));
+    squamous = _mm_castsi128_ps(
+        _mm_cmpeq_epi32(region, _mm_set1_epi32(static_cast<int>(Region::oesophagus))));
+    footprint_mm = second.w;
   }
 };
 
@@ -131,6 +135,7 @@ Mucosa::Mucosa(const MucosaOptions& options, std::uint64_t seed,
 // The slow layers of four places, and where the fine ones lie. A layer that shows at none of the
 // four is not looked for.
 struct Mucosa::Layers {
+  FourPlaces at;
   Float4x4 blotch, mottle, tint;
   Float4 area_share, patch_share, pit_share, vessels_shown;
   bool area_shows, patch_shows, pit_shows, vessels_show;
@@ -139,7 +144,8 @@ struct Mucosa::Layers {
   Layers() {}  // filled by find_layers
 };
 
-void Mucosa::find_layers(const FourPlaces& at, Layers& l) const {
+void Mucosa::find_layers(Layers& l) const {
+  const FourPlaces& at = l.at;
   const NoiseTile& smooth = tiles_->smooth;
   const NoiseTile& cells = tiles_->cells;
   const Float4x3 &p = at.p, pa = kTurnA * p, pb = kTurnB * p;
@@ -173,7 +179,8 @@ void Mucosa::find_layers(const FourPlaces& at, Layers& l) const {
 // Vessels of the submucosa run where the largest of three fields (two noises and 0) changes
 // hands: lines that meet by threes, as branches do. The distance to such a line is difference /
 // |gradient of the difference| along the wall.
-Float4 Mucosa::vessels(const FourPlaces& at, const Layers& layers) const {
+Float4 Mucosa::vessels(const Layers& layers) const {
+  const FourPlaces& at = layers.at;
   const Float4 zero = _mm_setzero_ps();
   const Float4x3 flat{zero, zero, zero};
   const Float4x4 first = tiles_->smooth.fetch(layers.first_vessel);
@@ -200,8 +207,8 @@ Float4 Mucosa::vessels(const FourPlaces& at, const Layers& layers) const {
          t * t * t;
 }
 
-void Mucosa::blend(const FourPlaces& at, const Layers& layers,
-                   std::span<MucosaSample> samples) const {
+void Mucosa::blend(const Layers& layers, std::span<MucosaSample> samples) const {
+  const FourPlaces& at = layers.at;
   const NoiseTile& smooth = tiles_->smooth;
   const NoiseTile& cells = tiles_->cells;
   const Float4x4 &blotch = layers.blotch, &mottle = layers.mottle;
@@ -235,7 +242,7 @@ void Mucosa::blend(const FourPlaces& at, const Layers& layers,
   };
   const Float4 lost_slope =
       lost(kLongSlope, layers.patch_share) + lost(kShortSlope, layers.pit_share);
-  const Float4 vessel = layers.vessels_show ? vessels(at, layers) : zero;
+  const Float4 vessel = layers.vessels_show ? vessels(layers) : zero;
 
   // Absorption acts on each colour; the limits keep the albedo inside (0, 1) at any contrast.
   const auto contrast = splat(static_cast<float>(options_.mottle_contrast));
@@ -292,10 +299,12 @@ void Mucosa::sample(std::span<const MucosaPlace> places, std::span<MucosaSample>
     const auto four = [&batch](std::size_t k) {
       return batch.subspan(k, std::min(kFour, batch.size() - k));
     };
+    for (std::size_t k = 0; k < batch.size(); k += kFour) {
+      layers[k / kFour].at.take(four(k));
+      find_layers(layers[k / kFour]);
+    }
     for (std::size_t k = 0; k < batch.size(); k += kFour)
-      find_layers(FourPlaces(four(k)), layers[k / kFour]);
-    for (std::size_t k = 0; k < batch.size(); k += kFour)
-      blend(FourPlaces(four(k)), layers[k / kFour], samples.subspan(begin + k, four(k).size()));
+      blend(layers[k / kFour], samples.subspan(begin + k, four(k).size()));
   }
   if (!instances_) return;
   for (std::size_t k = 0; k < places.size(); ++k) {

@@ -81,9 +81,9 @@ class Mucosa {
   struct Tiles;
   struct FourPlaces;
   struct Layers;
-  void find_layers(const FourPlaces& at, Layers& layers) const;
-  Float4 vessels(const FourPlaces& at, const Layers& layers) const;
-  void blend(const FourPlaces& at, const Layers& layers, std::span<MucosaSample> samples) const;
+  void find_layers(Layers& layers) const;
+  Float4 vessels(const Layers& layers) const;
+  void blend(const Layers& layers, std::span<MucosaSample> samples) const;
   MucosaOptions options_;
   Vec3f base_albedo_;
   std::shared_ptr<const Tiles> tiles_;

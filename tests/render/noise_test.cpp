@@ -1,4 +1,3 @@
-#include "render/electron_noise.h"
 #include "render/noise.h"
 
 #include <gtest/gtest.h>
@@ -7,6 +6,7 @@
 #include <map>
 
 #include "core/random.h"
+#include "render/electron_noise.h"
 #include "render/sensor.h"
 
 namespace rugae {
@@ -111,7 +111,7 @@ TEST(Noise, ElectronsFollowTheSensorModel) {
       double sum = 0.0, squares = 0.0;
       const auto m = static_cast<float>(mean);
       for (int i = 0; i < kDraws / 3; ++i)
-        for (float e : noise({m, m, m}, 4, i)) {
+        for (float e : noise(std::array<float, 3>{m, m, m}, 4, i)) {
           sum += e - mean;
           squares += (e - mean) * (e - mean);
           counts[std::clamp(static_cast<int>(std::floor((e - low) / width)), 0, cells - 1)] += 1.0;
@@ -153,7 +153,8 @@ TEST(Noise, FourNormalNumbersAreTheSame) {
   std::vector<std::uint32_t> words = {0, 1, 15, 16, 17, 31, 32, 33, 0x7fffffff, 0x80000000, ~0u};
   for (int bit = 4; bit < 31; ++bit)
     for (const std::uint32_t beside : {0u, 1u, ~0u})
-      for (const std::uint32_t sign : {0u, 1u << 31}) words.push_back(((1u << bit) + beside) | sign);
+      for (const std::uint32_t sign : {0u, 1u << 31})
+        words.push_back(((1u << bit) + beside) | sign);
   for (std::uint64_t i = 0; i < 1000; ++i)
     words.push_back(random_words(5, Purpose::test, 0, i)[0] >> (i % 32));
   while (words.size() % 4 != 0) words.push_back(0);
@@ -171,14 +172,15 @@ TEST(Noise, FourPixelsAreTheSame) {
     for (const float dark_e : {0.0f, 5.0f, 70.0f, 500.0f, -1.0f}) {
       alignas(16) const float mean[3][4] = {
           {900.0f, 700.0f, dark_e, 5000.0f}, {200.0f, dark_e, 100.0f, 90.0f}, {80, 400, 80, 300}};
-      const Float4x3 electrons =
-          noise({_mm_load_ps(mean[0]), _mm_load_ps(mean[1]), _mm_load_ps(mean[2])}, 9, 1234);
+      const Float4x3 means{_mm_load_ps(mean[0]), _mm_load_ps(mean[1]), _mm_load_ps(mean[2])};
+      const Float4x3 electrons = noise(means, 9, 1234);
       alignas(16) float four[3][4];
       _mm_store_ps(four[0], electrons.x);
       _mm_store_ps(four[1], electrons.y);
       _mm_store_ps(four[2], electrons.z);
       for (std::size_t k = 0; k < 4; ++k) {
-        const auto one = noise({mean[0][k], mean[1][k], mean[2][k]}, 9, 1234 + k);
+        const auto one =
+            noise(std::array<float, 3>{mean[0][k], mean[1][k], mean[2][k]}, 9, 1234 + k);
         for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(four[c][k], one[c]) << dark_e;
       }
     }
