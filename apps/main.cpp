@@ -2,6 +2,8 @@
 // error. Exit codes: 0 done, 1 a fault of ours, 2 bad usage or input, 3 a gate failed, 130 stopped
 // by Ctrl-C.
 
+#include <malloc.h>
+
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -20,9 +22,17 @@ int said(int code, const char* text) {
   return code;
 }
 
+// Frames come and go by the dozen megabytes: their memory is kept for the next ones, not handed back
+// to the system, which would clear every page of it again.
+void keep_memory() {
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);  // the most that glibc takes
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  keep_memory();
   rugae::Progress::catch_interrupts();
   CLI::App app{"rugae: a capsule endoscope in a stomach, simulated, reconstructed and measured"};
   app.set_version_flag("--version", RUGAE_VERSION);

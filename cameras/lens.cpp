@@ -41,13 +41,19 @@ struct Distorted {
   Mat2 jacobian;
 };
 
+Vec2 distorted(const Lens& lens, const Vec2& n) {
+  const double x = n.x(), y = n.y(), r2 = x * x + y * y;
+  const double radial = 1.0 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3));
+  return {x * radial + 2.0 * lens.p1 * x * y + lens.p2 * (r2 + 2.0 * x * x),
+          y * radial + lens.p1 * (r2 + 2.0 * y * y) + 2.0 * lens.p2 * x * y};
+}
+
 Distorted brown_conrady(const Lens& lens, const Vec2& n) {
   const double x = n.x(), y = n.y(), r2 = x * x + y * y;
   const double radial = 1.0 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3));
   const double radial_by_r2 = lens.k1 + r2 * (2.0 * lens.k2 + r2 * 3.0 * lens.k3);
   Distorted d;
-  d.point = {x * radial + 2.0 * lens.p1 * x * y + lens.p2 * (r2 + 2.0 * x * x),
-             y * radial + lens.p1 * (r2 + 2.0 * y * y) + 2.0 * lens.p2 * x * y};
+  d.point = distorted(lens, n);
   const double cross = 2.0 * x * y * radial_by_r2 + 2.0 * lens.p1 * x + 2.0 * lens.p2 * y;
   d.jacobian << radial + 2.0 * x * x * radial_by_r2 + 2.0 * lens.p1 * y + 6.0 * lens.p2 * x, cross,
       cross, radial + 2.0 * y * y * radial_by_r2 + 6.0 * lens.p1 * y + 2.0 * lens.p2 * x;
@@ -132,7 +138,7 @@ std::optional<Vec2> LensProjector::project(const Vec3& p) const {
   if (!(p.z() >= cos_limit_ * norm)) return std::nullopt;
   Vec2 d;
   if (lens_.model == LensModel::brown_conrady) {
-    d = brown_conrady(lens_, {p.x() / p.z(), p.y() / p.z()}).point;
+    d = distorted(lens_, {p.x() / p.z(), p.y() / p.z()});
   } else {
     const double r = std::hypot(p.x(), p.y());
     if (r == 0.0) return Vec2(lens_.cx, lens_.cy);

@@ -9,7 +9,8 @@ namespace {
 struct Seen {
   bool met;
   Vec3 point_world;
-  double side;  // -1 where the wall's winding normal points away from the camera, 1 elsewhere
+  Vec3 normal_world;  // of the triangle, towards the camera
+  double side;        // -1 where the winding normal points away from the camera, 1 elsewhere
 };
 
 // Where a material point of this frame's wall is at a time of the other frame.
@@ -18,6 +19,7 @@ class Follow {
   Follow(const Tile& tile, const Wall& wall, const OtherFrame& other)
       : tile_(tile), wall_(wall), other_(other), still_(&wall == &other.wall) {}
 
+  bool still() const { return still_; }
   Vec3 point(int lane, const Seen& seen, double offset_s) const {
     if (still_) return seen.point_world;
     const Hit& hit = tile_.hit[lane];
@@ -37,10 +39,12 @@ struct FlowOut {
   unsigned char valid, occluded;  // bits of the mask
 };
 
-void label_flow(const Tile& tile, const RayTable& rays, const LensProjector& lens, const Wall& wall,
+void label_flow(const Tile& tile, const LensProjector& lens, const Wall& wall,
                 const OtherFrame& other, const Lanes<Seen>& seen, const FlowOut& out,
                 cv::Mat& masks) {
   const Follow follow(tile, wall, other);
+  auto* const flow_px = out.flow_px.ptr<Vec2f>();
+  auto* const mask = masks.ptr<unsigned char>();
   const RowPoses& camera = other.view.camera;
   Rigid3 pose = camera.of_row(0);
   Mat3 cam_from_world = pose.rotation.toRotationMatrix().transpose();  // rotation alone
@@ -53,8 +57,7 @@ void label_flow(const Tile& tile, const RayTable& rays, const LensProjector& len
   for (int lane = 0; lane < tile.count; ++lane) {
     lands[lane] = faces[lane] = 0;
     if (!seen[lane].met) continue;
-    const int i = tile.pixel[lane];
-    const Vec2 pixel(i % rays.width + 0.5, i / rays.width + 0.5);
+    const Vec2 pixel(tile.column[lane] + 0.5, tile.row[lane] + 0.5);
     const auto at = [&](double offset_s) { return follow.point(lane, seen[lane], offset_s); };
     double offset_s = 0.0;
     std::optional<Vec2> landing;
@@ -72,10 +75,13 @@ void label_flow(const Tile& tile, const RayTable& rays, const LensProjector& len
     }
     if (!lens.contains(*landing)) continue;
     lands[lane] = 1;
-    const Vec3 normal = seen[lane].side * other.wall.geometric_normal(tile.hit[lane].triangle,
-                                                                      other.view.beat(offset_s));
+    const Vec3 normal =
+        follow.still()
+            ? seen[lane].normal_world
+            : Vec3(seen[lane].side *
+                   other.wall.geometric_normal(tile.hit[lane].triangle, other.view.beat(offset_s)));
     faces[lane] = normal.dot(point_world[lane] - pose.translation) < 0.0;
-    out.flow_px.ptr<Vec2f>()[i] = (*landing - pixel).cast<float>();
+    flow_px[tile.pixel[lane]] = (*landing - pixel).cast<float>();
   }
 
   const auto n = static_cast<std::size_t>(tile.count);
@@ -84,9 +90,8 @@ void label_flow(const Tile& tile, const RayTable& rays, const LensProjector& len
                                      {hidden.data(), n});
   for (int lane = 0; lane < tile.count; ++lane) {
     if (!lands[lane]) continue;
-    unsigned char& mask = masks.ptr<unsigned char>()[tile.pixel[lane]];
-    mask |= out.valid;
-    if (!faces[lane] || hidden[lane]) mask |= out.occluded;
+    const bool occluded = !faces[lane] || hidden[lane];
+    mask[tile.pixel[lane]] |= out.valid | (occluded ? out.occluded : 0);
   }
 }
 
@@ -130,13 +135,14 @@ void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& len
     if (normal)
       normal[i] = (instant.world_from_camera.transpose() * (side * winding)).cast<float>();
     seen[lane].point_world = tile.eye_of(lane).position_mm + hit.range_mm * ray_world;
+    seen[lane].normal_world = side * winding;
     seen[lane].side = side;
   }
   if (view.next)
-    label_flow(tile, rays, lens, view.wall, *view.next, seen,
+    label_flow(tile, lens, view.wall, *view.next, seen,
                {truth.flow_px, kMaskFlowValid, kMaskFlowOccluded}, truth.masks);
   if (view.previous)
-    label_flow(tile, rays, lens, view.wall, *view.previous, seen,
+    label_flow(tile, lens, view.wall, *view.previous, seen,
                {truth.backward_flow_px, kMaskBackwardFlowValid, kMaskBackwardFlowOccluded},
                truth.masks);
 }

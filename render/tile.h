@@ -27,6 +27,7 @@ struct Instant {
 struct Tile {
   int count = 0;     // lanes in use
   Lanes<int> pixel;  // index into the ray table, in 4 x 4 blocks so that packets stay together
+  Lanes<int> column, row;  // of the pixel
   std::span<const Instant> instants;
   Lanes<int> instant;   // index into instants
   bool one_eye = true;  // eye[0] is that of every lane
@@ -52,8 +53,11 @@ inline void place_pixels(const RayTable& rays, int x0, int y0, Tile& tile) {
   for (int yb = y0; yb < y1; yb += kBlock)
     for (int xb = x0; xb < x1; xb += kBlock)
       for (int y = yb; y < std::min(yb + kBlock, y1); ++y)
-        for (int x = xb; x < std::min(xb + kBlock, x1); ++x)
+        for (int x = xb; x < std::min(xb + kBlock, x1); ++x) {
+          tile.column[tile.count] = x;
+          tile.row[tile.count] = y;
           tile.pixel[tile.count++] = y * rays.width + x;
+        }
 }
 
 /// Fills the rays of the tile whose first pixel is (x0, y0): through the pixels' centres, at one
@@ -65,7 +69,7 @@ inline void place_tile(const RayTable& rays, std::span<const Instant> instants, 
   tile.one_eye = instants.size() == 1;
   for (int lane = 0; lane < tile.count; ++lane) {
     const int i = tile.pixel[lane];
-    tile.instant[lane] = tile.one_eye ? 0 : i / rays.width;
+    tile.instant[lane] = tile.one_eye ? 0 : tile.row[lane];
     const Instant& instant = tile.instant_of(lane);
     tile.eye[lane] = {instant.camera_mm, instant.beat};
     tile.direction_world[lane] = instant.world_from_camera * rays.directions_cam[i];
