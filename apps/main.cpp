@@ -2,6 +2,7 @@
 // error. Exit codes: 0 done, 1 a fault of ours, 2 bad usage or input, 3 a gate failed, 130 stopped
 // by Ctrl-C.
 
+#include <glog/logging.h>
 #include <malloc.h>
 
 #include <cstdio>
@@ -22,8 +23,8 @@ int said(int code, const char* text) {
   return code;
 }
 
-// Frames come and go by the dozen megabytes: their memory is kept for the next ones, not handed back
-// to the system, which would clear every page of it again.
+// Frames come and go by the dozen megabytes: their memory is kept for the next ones, not handed
+// back to the system, which would clear every page of it again.
 void keep_memory() {
   mallopt(M_MMAP_THRESHOLD, 32 << 20);  // the most that glibc takes
   mallopt(M_TRIM_THRESHOLD, 1 << 30);
@@ -33,6 +34,7 @@ void keep_memory() {
 
 int main(int argc, char** argv) {
   keep_memory();
+  FLAGS_minloglevel = google::GLOG_ERROR;  // of Ceres: a step that it tries again is no news
   rugae::Progress::catch_interrupts();
   CLI::App app{"rugae: a capsule endoscope in a stomach, simulated, reconstructed and measured"};
   app.set_version_flag("--version", RUGAE_VERSION);
