@@ -17,7 +17,7 @@ struct Scratch {
   SurfaceTile surface;
   RadianceTile radiance;
   Lanes<Vec3f> indirect;
-  LensSampler::Shifts shifts;
+  LensSampler::Pixels pixels;
   std::optional<PathTracer> paths;  // where there are bounces
 
   explicit Scratch(const PathOptions& options) {
@@ -138,10 +138,10 @@ cv::Mat FrameRenderer::gather(const FrameView& now, const LensSampling& sampling
   tbb::parallel_for(0, columns * rows, [&](int t) {
     Scratch* const s = &scratches.local();
     auto* out = radiance.ptr<Vec3f>();
-    sampler.begin(t % columns * kTileWidth, t / columns * kTileHeight, s->tile, s->shifts);
+    sampler.begin(t % columns * kTileWidth, t / columns * kTileHeight, s->tile, s->pixels);
     for (int k = 0; k < sampling.samples; ++k) {
       const double start = thread_seconds();
-      sampler.place(k, s->shifts, s->tile);
+      sampler.place(k, s->pixels, s->tile);
       const auto n = static_cast<std::size_t>(s->tile.count);
       wall.raycaster().intersect(s->tile.eyes(), {s->tile.direction_world.data(), n},
                                  {s->tile.hit.data(), n});

@@ -39,6 +39,16 @@ std::uint32_t sobol(std::uint32_t k, int dimension) {
   return x;
 }
 
+// Change of the ray per pixel at place `at` of a row or column of `size`, `stride` being the way to
+// the next; zero where the lens sees nothing beside it.
+Vec3 slope(const RayTable& rays, int pixel, int at, int size, int stride) {
+  const int low = at > 0 ? 1 : 0, high = at + 1 < size ? 1 : 0;
+  const Vec3& a = rays.directions_cam[static_cast<std::size_t>(pixel - low * stride)];
+  const Vec3& b = rays.directions_cam[static_cast<std::size_t>(pixel + high * stride)];
+  if (low + high == 0 || a.isZero(0.0) || b.isZero(0.0)) return Vec3::Zero();
+  return (b - a) / (low + high);
+}
+
 }  // namespace
 
 LensSampler::LensSampler(const RayTable& rays, const FrameView& view, const LensSampling& sampling)
@@ -65,39 +75,27 @@ LensSampler::LensSampler(const RayTable& rays, const FrameView& view, const Lens
   }
 }
 
-// Unit ray through the pixel's centre moved by (dx, dy) px; zero where the lens sees nothing.
-Vec3 LensSampler::beside(int pixel, double dx, double dy) const {
-  const int x = pixel % rays_.width, y = pixel / rays_.width;
-  const Vec3& center = rays_.directions_cam[static_cast<std::size_t>(pixel)];
-  const auto slope = [&](int at, int size, int stride) -> Vec3 {
-    const int low = at > 0 ? 1 : 0, high = at + 1 < size ? 1 : 0;
-    const Vec3& a = rays_.directions_cam[static_cast<std::size_t>(pixel - low * stride)];
-    const Vec3& b = rays_.directions_cam[static_cast<std::size_t>(pixel + high * stride)];
-    if (low + high == 0 || a.isZero(0.0) || b.isZero(0.0)) return Vec3::Zero();
-    return (b - a) / (low + high);
-  };
-  if (center.isZero(0.0)) return center;
-  const Vec3 d = center + dx * slope(x, rays_.width, 1) + dy * slope(y, rays_.height, rays_.width);
-  return d / std::sqrt(d.squaredNorm());
-}
-
-void LensSampler::begin(int x0, int y0, Tile& tile, Shifts& shifts) const {
+void LensSampler::begin(int x0, int y0, Tile& tile, Pixels& pixels) const {
   place_pixels(rays_, x0, y0, tile);
   tile.instants = instants_;
   tile.one_eye = instants_.size() == 1 && !(sampling_.aperture_radius_mm > 0.0);
-  for (int lane = 0; lane < tile.count; ++lane)
-    shifts[lane] = random_words(sampling_.seed, Purpose::lens_samples, sampling_.frame,
-                                static_cast<std::uint64_t>(tile.pixel[lane]));
+  for (int lane = 0; lane < tile.count; ++lane) {
+    const int pixel = tile.pixel[lane];
+    pixels.shift[lane] = random_words(sampling_.seed, Purpose::lens_samples, sampling_.frame,
+                                      static_cast<std::uint64_t>(pixel));
+    pixels.to_right[lane] = slope(rays_, pixel, tile.column[lane], rays_.width, 1);
+    pixels.down[lane] = slope(rays_, pixel, tile.row[lane], rays_.height, rays_.width);
+  }
 }
 
-void LensSampler::place(int k, const Shifts& shifts, Tile& tile) const {
+void LensSampler::place(int k, const Pixels& pixels, Tile& tile) const {
   std::array<std::uint32_t, 4> point;
   for (int d = 0; d < 4; ++d) point[d] = sobol(static_cast<std::uint32_t>(k), d);
   for (int lane = 0; lane < tile.count; ++lane) {
     const int pixel = tile.pixel[lane];
-    const auto& shift = shifts[lane];
+    const auto& shift = pixels.shift[lane];
     const auto at = [&](int d) { return uniform01(point[d] ^ shift[d]); };
-    int instant = rows_alike_ ? 0 : pixel / rays_.width * instants_a_row_;
+    int instant = rows_alike_ ? 0 : tile.row[lane] * instants_a_row_;
     if (instants_a_row_ > 1) {
       const auto late = random_uniform(sampling_.seed, Purpose::lens_samples, sampling_.frame,
                                        static_cast<std::uint64_t>(pixel) | (1ull << 40));
@@ -105,7 +103,12 @@ void LensSampler::place(int k, const Shifts& shifts, Tile& tile) const {
     }
     tile.instant[lane] = instant;
     const Instant& moment = instants_[static_cast<std::size_t>(instant)];
-    const Vec3 ray = beside(pixel, at(0) - 0.5, at(1) - 0.5);
+    // Zero where the lens sees nothing.
+    Vec3 ray = rays_.directions_cam[static_cast<std::size_t>(pixel)];
+    if (!ray.isZero(0.0)) {
+      ray += (at(0) - 0.5) * pixels.to_right[lane] + (at(1) - 0.5) * pixels.down[lane];
+      ray /= std::sqrt(ray.squaredNorm());
+    }
     Vec3 start_cam = Vec3::Zero(), direction_cam = ray;
     if (sampling_.aperture_radius_mm > 0.0 && ray.z() > 0.0) {
       const double radius_mm = sampling_.aperture_radius_mm * std::sqrt(at(2));

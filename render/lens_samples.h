@@ -35,16 +35,17 @@ class LensSampler {
   /// neighbours: it errs by less than 0.001 px for lenses as wide as 100 degrees.
   LensSampler(const RayTable& rays, const FrameView& view, const LensSampling& sampling);
 
-  /// The digital shifts of a tile's pixels.
-  using Shifts = Lanes<std::array<std::uint32_t, 4>>;
+  /// What the samples of a tile's pixels share.
+  struct Pixels {
+    Lanes<std::array<std::uint32_t, 4>> shift;  // digital
+    Lanes<Vec3> to_right, down;                 // the ray's change over a pixel
+  };
   /// Begins the tile whose first pixel is (x0, y0).
-  void begin(int x0, int y0, Tile& tile, Shifts& shifts) const;
+  void begin(int x0, int y0, Tile& tile, Pixels& pixels) const;
   /// Fills the rays of sample `k` for the tile that was begun.
-  void place(int k, const Shifts& shifts, Tile& tile) const;
+  void place(int k, const Pixels& pixels, Tile& tile) const;
 
  private:
-  Vec3 beside(int pixel, double dx, double dy) const;
-
   const RayTable& rays_;
   LensSampling sampling_;
   int instants_a_row_;
