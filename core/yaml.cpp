@@ -99,6 +99,14 @@ const YAML::Node* YamlReader::find(const std::string& key) {
 
 bool YamlReader::has(const std::string& key) const { return state_->values.contains(key); }
 
+std::vector<std::string> YamlReader::keys() const {
+  std::vector<std::string> names;
+  for (const auto& [key, mark] : state_->key_marks) names.push_back(key);
+  const auto at = [&](const std::string& key) { return state_->key_marks.at(key).pos; };
+  std::ranges::sort(names, {}, at);
+  return names;
+}
+
 bool YamlReader::has_mapping(const std::string& key) const {
   const auto it = state_->values.find(key);
   return it != state_->values.end() && it->second.IsMap();
@@ -159,6 +167,20 @@ void YamlReader::get(const std::string& key, std::vector<std::string>& value) {
   for (const auto& entry : *node)
     value.push_back(as<std::string>(state_->name, key, entry, "a text"));
 }
+void YamlReader::get(const std::string& key, std::vector<std::uint64_t>& value) {
+  const auto* node = find(key);
+  if (!node) return;
+  const char* expected = "a whole number of at least 0";
+  value.clear();
+  if (node->IsScalar()) {
+    value.push_back(as<std::uint64_t>(state_->name, key, *node, expected));
+    return;
+  }
+  check(node->IsSequence(), "{}: {} is {}, expected a list of whole numbers",
+        place(state_->name, node->Mark()), key, shown(*node));
+  for (const auto& entry : *node)
+    value.push_back(as<std::uint64_t>(state_->name, key, entry, expected));
+}
 void YamlReader::get_deg(const std::string& key, double& value_rad) {
   if (const auto* node = find(key)) value_rad = rad_from_deg(as_number(state_->name, key, *node));
 }
@@ -200,6 +222,25 @@ void YamlReader::finish() const {
   for (const auto& [key, mark] : state_->key_marks)
     check(std::ranges::count(state_->asked, key) > 0, "{}: unknown key '{}'{}",
           place(state_->name, mark), key, did_you_mean(key, state_->asked));
+}
+
+std::string yaml_with(const std::string& text, const std::string& path, const std::string& value) {
+  YAML::Node root = YAML::Load(text);
+  YAML::Node at = root;  // refers to the same document
+  for (std::size_t begin = 0;;) {
+    const std::size_t end = std::min(path.find('.', begin), path.size());
+    const std::string key = path.substr(begin, end - begin);
+    check(!key.empty(), "'{}' is not a path of keys", path);
+    check(!at.IsDefined() || at.IsNull() || at.IsMap(), "'{}' is {}, expected a mapping",
+          path.substr(0, begin > 0 ? begin - 1 : 0), shown(at));
+    YAML::Node next = at[key];
+    if (end == path.size()) {
+      next = value;
+      return YAML::Dump(root);
+    }
+    at.reset(next);
+    begin = end + 1;
+  }
 }
 
 }  // namespace rugae

@@ -35,6 +35,7 @@ class YamlReader {
   YamlReader(const YamlReader&);
 
   bool has(const std::string& key) const;
+  std::vector<std::string> keys() const;           // in the file's order
   bool has_mapping(const std::string& key) const;  // has it, and its value is a mapping
   void get(const std::string& key, double& value);
   void get(const std::string& key, int& value);
@@ -47,6 +48,7 @@ class YamlReader {
   void get(const std::string& key, std::vector<double>& value);
   void get(const std::string& key,
            std::vector<std::string>& value);  // a single word is a list of one
+  void get(const std::string& key, std::vector<std::uint64_t>& value);  // likewise
   /// A key `<name>_deg` holds degrees, the variable radians.
   void get_deg(const std::string& key, double& value_rad);
 
@@ -74,5 +76,10 @@ class YamlReader {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// The same document with `value` at a path of keys such as "render.sensor.noise"; mappings on the
+/// way are made where they are absent. Throws Error where something that is no mapping stands in
+/// the way. Places in the new text are not those in the old.
+std::string yaml_with(const std::string& text, const std::string& path, const std::string& value);
 
 }  // namespace rugae

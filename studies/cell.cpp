@@ -17,7 +17,7 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 // Raised when the same settings give other results, so that older ones are not taken for new.
-constexpr int kResultsVersion = 1;
+constexpr int kResultsVersion = 2;
 constexpr std::size_t kHashLetters = 10;
 
 std::string stem(const std::string& name_or_path) { return fs::path(name_or_path).stem().string(); }
@@ -37,15 +37,14 @@ std::string preset_hash(const std::string& kind, const std::string& what,
 }
 
 // Everything the dataset is a function of.
-json dataset_key(const StudyOptions& study, const Cell& cell) {
-  const SimulateOptions& s = study.simulate;
+json dataset_key(const SimulateOptions& s, const Cell& cell) {
   return {{"version", kResultsVersion},
           {"scene", preset_hash("scenes", "scene", s.scene)},
           {"camera", preset_hash("cameras", "camera", cell.camera)},
           {"trajectory", preset_hash("trajectories", "trajectory", cell.trajectory)},
           {"resolution", s.resolution},
           {"frames", s.frames},
-          {"seed", s.seed},
+          {"seed", cell.seed},
           {"render", json::parse(settings_json(s.render))}};
 }
 
@@ -76,14 +75,14 @@ json read_json(const fs::path& file) {
 }
 
 // The dataset, from an earlier run where it is complete; returns what simulating measured.
-json make_dataset(const StudyOptions& study, const Cell& cell, const fs::path& dataset,
+json make_dataset(SimulateOptions options, const Cell& cell, const fs::path& dataset,
                   Progress& progress) {
   fs::path times = dataset;
   times += ".json";
   if (fs::exists(DatasetLayout{dataset}.manifest()) && fs::exists(times)) return read_json(times);
-  SimulateOptions options = study.simulate;
   options.camera = cell.camera;
   options.trajectory = cell.trajectory;
+  options.seed = cell.seed;
   const json measured = simulation_json(simulate(options, dataset, progress));
   write_atomic(times, measured.dump(2) + "\n");
   return measured;
@@ -116,27 +115,44 @@ json metrics_of_failure(const std::string& reason, const json& simulation) {
 }  // namespace
 
 std::string Cell::name() const {
-  return fmt::format("{}_{}_{}", stem(camera), stem(trajectory), method);
+  std::string name = fmt::format("{}_{}_{}", stem(camera), stem(trajectory), method);
+  if (!settings.empty()) name += fmt::format("_v{}", variant + 1);
+  if (one_of_seeds) name += fmt::format("_seed{}", seed);
+  return name;
+}
+
+std::string Cell::setting() const {
+  std::string text = shown(settings);
+  if (one_of_seeds) text += fmt::format("{}seed {}", text.empty() ? "" : ", ", seed);
+  return text;
 }
 
 std::string Cell::title() const {
-  return fmt::format("{}, trajectory {}, {}", stem(camera), stem(trajectory), method);
+  const std::string more = setting();
+  return fmt::format("{}, trajectory {}, {}{}", stem(camera), stem(trajectory), method,
+                     more.empty() ? "" : ", " + more);
 }
 
 std::vector<Cell> cells_of(const StudyOptions& study) {
   std::vector<Cell> cells;
   for (const std::string& camera : study.cameras)
     for (const std::string& trajectory : study.trajectories)
-      for (const std::string& method : study.methods) cells.push_back({camera, trajectory, method});
+      for (int v = 0; v < static_cast<int>(study.variants.size()); ++v)
+        for (const std::uint64_t seed : study.seeds)
+          for (const std::string& method : study.methods)
+            cells.push_back({camera, trajectory, method, study.variants[v].settings, seed,
+                             study.seeds.size() > 1, v});
   return cells;
 }
 
 CellResult run_cell(const StudyOptions& study, const Cell& cell, const fs::path& out,
                     Progress& progress) {
   for (const char* folder : {"datasets", "estimates", "metrics"}) make_folder(out / folder);
-  ReconOptions recon = study.recon;
+  const Variant& variant = study.variants[static_cast<std::size_t>(cell.variant)];
+  ReconOptions recon = variant.recon;
   recon.method = cell.method;
-  const json data_key = dataset_key(study, cell);
+  recon.seed = cell.seed;
+  const json data_key = dataset_key(variant.simulate, cell);
   const std::string data_hash = short_hash(data_key);
   const std::string hash = short_hash({{"dataset", data_key}, {"recon", to_json_text(recon)}});
 
@@ -151,7 +167,7 @@ CellResult run_cell(const StudyOptions& study, const Cell& cell, const fs::path&
     result.metrics = read_json(metrics);
     return result;
   }
-  const json simulation = make_dataset(study, cell, result.dataset, progress);
+  const json simulation = make_dataset(variant.simulate, cell, result.dataset, progress);
   const auto gave_up = make_estimate(recon, result.dataset, result.estimate, progress);
   result.metrics = gave_up ? metrics_of_failure(*gave_up, simulation)
                            : evaluate(result.dataset, result.estimate, progress);

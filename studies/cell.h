@@ -1,5 +1,6 @@
 #pragma once
-// A cell of a study: one camera on one trajectory, reconstructed by one method.
+// A cell of a study: one camera on one trajectory, with one combination of the axes' values and one
+// seed, reconstructed by one method.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -13,8 +14,15 @@ namespace rugae {
 
 struct Cell {
   std::string camera, trajectory, method;
-  std::string name() const;   // "misumi-v5506_1_paper": a name for files
-  std::string title() const;  // "misumi-v5506, trajectory 1, paper"
+  std::vector<Setting> settings = {};  // of the axes
+  std::uint64_t seed = 1;
+  bool one_of_seeds = false;  // the study has several
+  int variant = 0;            // of the study
+  // "misumi-v5506_1_paper": a name for files; behind it the number of the variant, "v2", and the
+  // seed, "seed3", where there are several
+  std::string name() const;
+  std::string title() const;    // "misumi-v5506, trajectory 1, paper, frames=60, seed 3"
+  std::string setting() const;  // what `title` says after the method
 };
 
 struct CellResult {
@@ -24,7 +32,7 @@ struct CellResult {
   bool kept = false;       // found finished from an earlier run
 };
 
-/// All combinations, camera by camera.
+/// All combinations, camera by camera; seeds are the fastest but for methods.
 std::vector<Cell> cells_of(const StudyOptions& study);
 
 /// Simulates, reconstructs and evaluates. Every result lies in a folder named by the cell and a

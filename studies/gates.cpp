@@ -1,5 +1,6 @@
 #include "studies/gates.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -25,6 +26,8 @@ bool names(const Gate& gate, const Cell& cell) {
   const auto fits = [](const std::string& wanted, const std::string& is) {
     return wanted.empty() || wanted == is;
   };
+  for (const Setting& setting : gate.settings)
+    if (std::ranges::count(cell.settings, setting) == 0) return false;
   return fits(gate.camera, cell.camera) && fits(gate.trajectory, cell.trajectory) &&
          fits(gate.method, cell.method);
 }

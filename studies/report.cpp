@@ -41,9 +41,14 @@ std::string filled(std::string page, const std::map<std::string, std::string>& v
   return out;
 }
 
+std::string counted(std::size_t n, const std::string& one, const std::string& many = "") {
+  return fmt::format("{} {}", n, n == 1 ? one : many.empty() ? one + "s" : many);
+}
+
 std::string lede(const ReportInput& input, const CellView& first) {
   const Lens& lens = first.truth.camera().lens;
-  const std::string scene = html::escape(stem(input.study.simulate.scene));
+  const SimulateOptions& simulate = input.study.variants.front().simulate;
+  const std::string scene = html::escape(stem(simulate.scene));
   if (input.cells.size() == 1)
     return fmt::format(
         "{} frames of {} &times; {} px from a capsule camera (<b>{}</b>) on <b>trajectory {}</b>, "
@@ -54,16 +59,16 @@ std::string lede(const ReportInput& input, const CellView& first) {
         html::escape(paper_camera(stem(first.cell.cell.camera))),
         html::escape(stem(first.cell.cell.trajectory)),
         html::number(length_mm(first.truth.track()) / 10.0, 4), scene,
-        html::escape(input.study.simulate.resolution), input.study.simulate.seed,
+        html::escape(simulate.resolution), first.cell.cell.seed,
         html::escape(first.cell.cell.method));
   return fmt::format(
-      "{} cells: every combination of {} camera{}, {} trajectories and {} method{} in a simulated "
-      "stomach (<b>{}</b>, {}, seed {}), each reconstructed from its frames alone and measured "
-      "against the exact truth.",
-      input.cells.size(), input.study.cameras.size(), input.study.cameras.size() == 1 ? "" : "s",
-      input.study.trajectories.size(), input.study.methods.size(),
-      input.study.methods.size() == 1 ? "" : "s", scene,
-      html::escape(input.study.simulate.resolution), input.study.simulate.seed);
+      "{} cells: every combination of {}, {}, {}, {} and {} in a simulated stomach (<b>{}</b>, "
+      "{}), "
+      "each reconstructed from its frames alone and measured against the exact truth.",
+      input.cells.size(), counted(input.study.cameras.size(), "camera"),
+      counted(input.study.trajectories.size(), "trajectory", "trajectories"),
+      counted(input.study.variants.size(), "setting"), counted(input.study.seeds.size(), "seed"),
+      counted(input.study.methods.size(), "method"), scene, html::escape(simulate.resolution));
 }
 
 std::string gates_part(const std::vector<GateOutcome>& gates) {
@@ -96,7 +101,9 @@ std::string overview_part(const std::vector<CellResult>& cells) {
     table.rows.push_back(
         {fmt::format("<a href=\"#{}\">{}</a>", html::escape(cell.cell.name()),
                      html::escape(paper_camera(stem(cell.cell.camera)))),
-         html::escape(stem(cell.cell.trajectory)), html::escape(cell.cell.method),
+         html::escape(stem(cell.cell.trajectory)),
+         html::escape(cell.cell.method) + "<br><small>" + html::escape(cell.cell.setting()) +
+             "</small>",
          html::number(at("trajectory.ate_sim3_rmse_mm")), of_paper(paper.ate_rmse_mm),
          html::number(at("surface.icp_aligned.accuracy_mean_mm")), of_paper(paper.map_mean_mm),
          html::number(100.0 * at("tracking.tracked_share")) + " %",

@@ -6,6 +6,8 @@
 #include "core/presets.h"
 #include "studies/cell.h"
 #include "studies/gates.h"
+#include "studies/junit.h"
+#include "studies/repeats.h"
 #include "studies/report.h"
 #include "studies/tables.h"
 
@@ -23,7 +25,10 @@ StudyResult run_study(const std::filesystem::path& study_file, const std::filesy
   const std::vector<GateOutcome> gates = hold_gates(study.gates, cells);
 
   write_atomic(out / "results.json", results_json(study, text, cells, gates).dump(1) + "\n");
+  write_atomic(out / "times.json", times_json(cells).dump(1) + "\n");
   write_atomic(out / "table.csv", table_csv(cells));
+  if (study.seeds.size() > 1) write_atomic(out / "repeats.csv", repeats_csv(cells));
+  write_atomic(out / "junit.xml", junit_xml(study.title, gates));
   progress.begin("report");
   StudyResult result;
   result.report = out / "report.html";

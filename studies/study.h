@@ -16,9 +16,14 @@ struct StudyResult {
   std::filesystem::path report;
 };
 
-/// STUDY.yaml: scene, resolution, seed, frames, cameras: [...], trajectories: [...], methods:
-/// [...], recon: {options}, gates: [{metric: trajectory.ate_sim3_rmse_mm, below: 40, reason: ...}].
-/// Finished cells of an earlier run are kept.
+/// STUDY.yaml: scene, resolution, frames, seed or seeds: [...], cameras: [...], trajectories:
+/// [...], methods: [...], render: {settings}, recon: {options}, axes: {recon.preprocess.undistort:
+/// [true, false], ...}, gates: [{metric: trajectory.ate_sim3_rmse_mm, below: 40, reason: ...,
+/// where: {recon.preprocess.undistort: true}}]. Every combination of all lists is a cell; cells
+/// share what is the same, and finished parts of an earlier run are kept.
+///
+/// Writes results.json, table.csv, times.json, repeats.csv (of several seeds), junit.xml (the gates
+/// as test cases) and report.html.
 StudyResult run_study(const std::filesystem::path& study, const std::filesystem::path& out,
                       Progress& progress);
 

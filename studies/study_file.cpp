@@ -1,5 +1,9 @@
 #include "studies/study_file.h"
 
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
 #include "core/check.h"
 #include "core/files.h"
 #include "core/presets.h"
@@ -8,7 +12,27 @@
 namespace rugae {
 namespace {
 
-Gate read_gate(YamlReader yaml) {
+// The axes and values that `where` names must be the study's: a gate that holds for nothing is a
+// mistake.
+void read_where(YamlReader& gate, const std::vector<Axis>& axes, std::vector<Setting>& settings) {
+  auto where = gate.child("where");
+  if (!where) return;
+  for (const std::string& path : where->keys()) {
+    Setting setting{path, {}};
+    where->get(path, setting.value);
+    std::vector<std::string> paths;
+    for (const Axis& axis : axes) paths.push_back(axis.path);
+    const auto axis = std::ranges::find(axes, path, &Axis::path);
+    check(axis != axes.end(), "{}: '{}' is no axis of the study{}", where->where(path), path,
+          did_you_mean(path, paths));
+    check(std::ranges::count(axis->values, setting.value) > 0,
+          "{}: {} is no value of the axis '{}': {}", where->where(path), setting.value, path,
+          fmt::join(axis->values, ", "));
+    settings.push_back(std::move(setting));
+  }
+}
+
+Gate read_gate(YamlReader yaml, const std::vector<Axis>& axes) {
   Gate gate;
   yaml.require("metric", gate.metric);
   yaml.require("reason", gate.reason);
@@ -25,6 +49,7 @@ Gate read_gate(YamlReader yaml) {
   yaml.get("camera", gate.camera);
   yaml.get("trajectory", gate.trajectory);
   yaml.get("method", gate.method);
+  read_where(yaml, axes, gate.settings);
   yaml.finish();
   return gate;
 }
@@ -43,29 +68,81 @@ void read_names(YamlReader& yaml, const std::string& key, const std::string& wha
   }
 }
 
+// All that is not read elsewhere, as one variant.
+Variant read_variant(YamlReader& yaml) {
+  Variant variant;
+  yaml.get("scene", variant.simulate.scene);
+  yaml.get("resolution", variant.simulate.resolution);
+  yaml.get("frames", variant.simulate.frames);
+  if (auto render = yaml.child("render")) read_settings(*render, variant.simulate.render);
+  check(variant.simulate.frames >= 0, "{}: frames is {}, expected at least 0 (0: as in the paper)",
+        yaml.where("frames"), variant.simulate.frames);
+  if (auto recon = yaml.child("recon")) read_options(*recon, variant.recon);
+  variant.simulate.check();
+  return variant;
+}
+
+// The file with these settings in it: an axis can set whatever the file can.
+Variant with_settings(const std::string& text, const std::vector<Setting>& settings) {
+  std::string changed = text;
+  for (const Setting& s : settings) changed = yaml_with(changed, s.path, s.value);
+  constexpr const char* kName = "changed";
+  try {
+    YamlReader yaml = YamlReader::from_text(changed, kName);
+    Variant variant = read_variant(yaml);
+    variant.settings = settings;
+    return variant;
+  } catch (const Error& error) {
+    // Without the place, which is one in the changed text.
+    const std::string what = error.what();
+    fail("{}", what.starts_with(kName) ? what.substr(what.find(": ") + 2) : what);
+  }
+}
+
+Variant read_variant_with(const std::string& text, const std::vector<Axis>& axes,
+                          const std::vector<Setting>& settings) {
+  try {
+    return with_settings(text, settings);
+  } catch (const Error& error) {
+    // The axis that is wrong alone, or all of them together.
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      try {
+        with_settings(text, {settings[i]});
+      } catch (const Error& alone) {
+        fail("{}: axis {}: {}", axes[i].where, shown({settings[i]}), alone.what());
+      }
+    }
+    fail("{}: axes {}: {}", axes.front().where, shown(settings), error.what());
+  }
+}
+
+void read_seeds(YamlReader& yaml, std::vector<std::uint64_t>& seeds) {
+  check(!(yaml.has("seed") && yaml.has("seeds")), "{}: seed and seeds, expected one of them",
+        yaml.where("seeds"));
+  yaml.get("seed", seeds.front());
+  yaml.get("seeds", seeds);
+  check(!seeds.empty(), "{}: seeds is empty, expected at least one", yaml.where("seeds"));
+  for (const std::uint64_t seed : seeds)
+    check(std::ranges::count(seeds, seed) == 1, "{}: seed {} stands twice", yaml.where("seeds"),
+          seed);
+}
+
 }  // namespace
 
 StudyOptions read_study_text(const std::string& text, const std::string& name) {
   YamlReader yaml = YamlReader::from_text(text, name);
   StudyOptions study;
   yaml.get("title", study.title);
-  yaml.get("scene", study.simulate.scene);
-  yaml.get("resolution", study.simulate.resolution);
-  yaml.get("seed", study.simulate.seed);
-  yaml.get("frames", study.simulate.frames);
-  if (auto render = yaml.child("render")) read_settings(*render, study.simulate.render);
-  check(study.simulate.frames >= 0, "{}: frames is {}, expected at least 0 (0: as in the paper)",
-        yaml.where("frames"), study.simulate.frames);
+  const Variant base = read_variant(yaml);
   read_names(yaml, "cameras", "camera", study.cameras);
   read_names(yaml, "trajectories", "trajectory", study.trajectories);
-  study.recon.seed = study.simulate.seed;
-  if (auto recon = yaml.child("recon")) read_options(*recon, study.recon);
-  study.methods = {study.recon.method};
+  read_seeds(yaml, study.seeds);
+  study.methods = {base.recon.method};
   yaml.get("methods", study.methods);
   check(!study.methods.empty(), "{}: methods is empty, expected at least one",
         yaml.where("methods"));
   for (const std::string& method : study.methods) {
-    ReconOptions options = study.recon;
+    ReconOptions options = base.recon;
     options.method = method;
     try {
       options.check();
@@ -73,9 +150,12 @@ StudyOptions read_study_text(const std::string& text, const std::string& name) {
       fail("{}: {}", yaml.where("methods"), error.what());
     }
   }
-  for (YamlReader& gate : yaml.children("gates")) study.gates.push_back(read_gate(gate));
+  const std::vector<Axis> axes = read_axes(yaml);
+  for (YamlReader& gate : yaml.children("gates")) study.gates.push_back(read_gate(gate, axes));
   yaml.finish();
-  study.simulate.check();
+  study.variants.clear();
+  for (const auto& settings : combinations(axes))
+    study.variants.push_back(settings.empty() ? base : read_variant_with(text, axes, settings));
   return study;
 }
 

@@ -8,8 +8,16 @@
 
 #include "recon/options.h"
 #include "render/simulate.h"
+#include "studies/axes.h"
 
 namespace rugae {
+
+/// What a cell runs with: one combination of the study's axes.
+struct Variant {
+  std::vector<Setting> settings;  // empty where there are no axes
+  SimulateOptions simulate;       // camera, trajectory and seed are those of the cell
+  ReconOptions recon;             // method and seed likewise
+};
 
 /// A bound on a metric, for every cell it names (all, where it names nothing).
 struct Gate {
@@ -17,20 +25,22 @@ struct Gate {
   std::optional<double> above, below;
   std::string reason;
   std::string camera, trajectory, method;  // empty: any
+  std::vector<Setting> settings;           // those it names must be the cell's
 };
 
-/// Keys of the file have the same names; `frames`, `seed`, `noise`, `vignetting`, `scene` and
-/// `resolution` go to `simulate`.
+/// Keys of the file have the same names; `frames`, `scene`, `resolution` and `render` go to
+/// `simulate`.
 struct StudyOptions {
   std::string title = "A stomach, simulated and reconstructed";
-  SimulateOptions simulate;  // camera and trajectory are those of the cell
   std::vector<std::string> cameras, trajectories, methods{"paper"};
-  ReconOptions recon;
+  std::vector<std::uint64_t> seeds{1};  // each draws the stomach, the paths and the noise anew
+  std::vector<Variant> variants{1};     // at least one
   std::vector<Gate> gates;
 };
 
 /// Reads a study file; throws Error with file, line and column for an unknown key, a wrong type,
-/// a value out of range, a preset that does not exist, or a gate without a bound or a reason.
+/// a value out of range, a preset that does not exist, a gate without a bound or a reason, or an
+/// axis whose path or value the file itself could not hold.
 StudyOptions read_study(const std::filesystem::path& file);
 /// The same from text; `name` stands for the file in errors.
 StudyOptions read_study_text(const std::string& text, const std::string& name);

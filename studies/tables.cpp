@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "core/check.h"
 
@@ -10,30 +11,49 @@ namespace {
 
 using nlohmann::json;
 
-json without_arrays(const json& metrics) {
+const std::vector<std::string> kSimulationFacts = {"frames", "path_length_mm", "min_clearance_mm"};
+
+// Without arrays, and without what another run would measure otherwise.
+json lasting(const json& metrics) {
   json out = metrics;
   out.erase("frames");
+  out.erase("time");
+  if (!out.contains("simulation")) return out;
+  for (const auto& [key, value] : metrics.at("simulation").items())
+    if (std::ranges::count(kSimulationFacts, key) == 0) out["simulation"].erase(key);
   return out;
 }
 
-void flatten(const json& node, const std::string& prefix, std::map<std::string, std::string>& row) {
+void flatten(const json& node, const std::string& prefix, std::map<std::string, double>& row) {
   for (const auto& [key, value] : node.items()) {
     const std::string path = prefix.empty() ? key : prefix + "." + key;
     if (value.is_object())
       flatten(value, path, row);
     else if (value.is_number())
-      row[path] = value.dump();
+      row[path] = value.get<double>();
   }
 }
 
-std::string quoted(const std::string& cell) {
-  if (cell.find_first_of(",\"\n") == std::string::npos) return cell;
-  std::string out = "\"";
-  for (const char c : cell) out += c == '"' ? "\"\"" : std::string(1, c);
-  return out + "\"";
+json settings_json(const std::vector<Setting>& settings) {
+  json out = json::object();
+  for (const Setting& s : settings) out[s.path] = s.value;
+  return out;
 }
 
 }  // namespace
+
+std::map<std::string, double> numbers_of(const CellResult& cell) {
+  std::map<std::string, double> numbers;
+  flatten(lasting(cell.metrics), "", numbers);
+  return numbers;
+}
+
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c);
+  return out + "\"";
+}
 
 json results_json(const StudyOptions& study, const std::string& study_text,
                   const std::vector<CellResult>& cells, const std::vector<GateOutcome>& gates) {
@@ -42,9 +62,11 @@ json results_json(const StudyOptions& study, const std::string& study_text,
     list.push_back({{"camera", cell.cell.camera},
                     {"trajectory", cell.cell.trajectory},
                     {"method", cell.cell.method},
+                    {"axes", settings_json(cell.cell.settings)},
+                    {"seed", cell.cell.seed},
                     {"dataset", cell.dataset.filename().string()},
                     {"estimate", cell.estimate.filename().string()},
-                    {"metrics", without_arrays(cell.metrics)}});
+                    {"metrics", lasting(cell.metrics)}});
   for (const GateOutcome& gate : gates)
     held.push_back({{"cell", gate.cell},
                     {"metric", gate.metric},
@@ -55,25 +77,37 @@ json results_json(const StudyOptions& study, const std::string& study_text,
   return {{"title", study.title}, {"study", study_text}, {"cells", list}, {"gates", held}};
 }
 
+json times_json(const std::vector<CellResult>& cells) {
+  json list = json::array();
+  for (const CellResult& cell : cells)
+    list.push_back({{"cell", cell.cell.title()},
+                    {"time", cell.metrics.value("time", json())},
+                    {"simulation", cell.metrics.value("simulation", json())}});
+  return {{"cells", list}};
+}
+
 std::string table_csv(const std::vector<CellResult>& cells) {
-  std::vector<std::map<std::string, std::string>> rows;
-  std::vector<std::string> columns;
+  std::vector<std::map<std::string, double>> rows;
+  std::set<std::string> metrics;
   for (const CellResult& cell : cells) {
-    flatten(without_arrays(cell.metrics), "", rows.emplace_back());
-    for (const auto& [path, value] : rows.back())
-      if (std::ranges::count(columns, path) == 0) columns.push_back(path);
+    rows.push_back(numbers_of(cell));
+    for (const auto& [path, value] : rows.back()) metrics.insert(path);
   }
-  std::ranges::sort(columns);
   std::string text = "camera,trajectory,method";
-  for (const std::string& column : columns) text += "," + quoted(column);
+  if (!cells.empty())
+    for (const Setting& axis : cells.front().cell.settings) text += "," + csv_field(axis.path);
+  text += ",seed";
+  for (const std::string& metric : metrics) text += "," + csv_field(metric);
   text += "\n";
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const Cell& cell = cells[i].cell;
-    text +=
-        fmt::format("{},{},{}", quoted(cell.camera), quoted(cell.trajectory), quoted(cell.method));
-    for (const std::string& column : columns) {
-      const auto it = rows[i].find(column);
-      text += "," + (it == rows[i].end() ? std::string() : it->second);
+    text += fmt::format("{},{},{}", csv_field(cell.camera), csv_field(cell.trajectory),
+                        csv_field(cell.method));
+    for (const Setting& axis : cell.settings) text += "," + csv_field(axis.value);
+    text += fmt::format(",{}", cell.seed);
+    for (const std::string& metric : metrics) {
+      const auto at = rows[i].find(metric);
+      text += at == rows[i].end() ? "," : fmt::format(",{}", at->second);
     }
     text += "\n";
   }

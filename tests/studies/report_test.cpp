@@ -121,9 +121,9 @@ TEST(Tables, CsvHasARowACellAndEmptyPlacesWhereNothingWasMeasured) {
   a.metrics = {{"x", {{"y_mm", 1.5}, {"z_mm", nullptr}}}, {"frames", {{"time_s", {1, 2}}}}};
   b.cell = {"cam,2", "1", "paper"};
   b.metrics = {{"x", {{"y_mm", 2.5}, {"z_mm", 3.0}}}};
-  EXPECT_EQ(
-      table_csv({a, b}),
-      "camera,trajectory,method,x.y_mm,x.z_mm\ncam,1,paper,1.5,\n\"cam,2\",1,paper,2.5,3.0\n");
+  EXPECT_EQ(table_csv({a, b}),
+            "camera,trajectory,method,seed,x.y_mm,x.z_mm\ncam,1,paper,1,1.5,\n\"cam,2\",1,paper,1,"
+            "2.5,3\n");
 }
 
 }  // namespace

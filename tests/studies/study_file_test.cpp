@@ -28,11 +28,12 @@ TEST(StudyFile, ReadsWhatItSays) {
                           "gates: [{metric: tracking.tracked_share, above: 0.5, reason: why}]\n",
                       "study.yaml");
   EXPECT_EQ(study.title, "A title");
-  EXPECT_EQ(study.simulate.frames, 30);
-  EXPECT_EQ(study.simulate.seed, 7u);
-  EXPECT_EQ(study.recon.seed, 7u);
-  EXPECT_FALSE(study.simulate.render.sensor.noise);
-  EXPECT_EQ(study.simulate.resolution, "coarse");
+  ASSERT_EQ(study.variants.size(), 1u);
+  const SimulateOptions& simulate = study.variants[0].simulate;
+  EXPECT_EQ(simulate.frames, 30);
+  EXPECT_EQ(study.seeds, (std::vector<std::uint64_t>{7}));
+  EXPECT_FALSE(simulate.render.sensor.noise);
+  EXPECT_EQ(simulate.resolution, "coarse");
   ASSERT_EQ(study.gates.size(), 1u);
   EXPECT_EQ(study.gates[0].above, 0.5);
   EXPECT_FALSE(study.gates[0].below);
@@ -70,6 +71,70 @@ TEST(StudyFile, EveryPresetReads) {
     SCOPED_TRACE(name);
     EXPECT_FALSE(cells_of(read_study(find_preset("studies", "study", name))).empty());
   }
+}
+
+// Axes reach every setting of the file, by its path; the file's own value stands elsewhere.
+TEST(StudyFile, AxesMakeEveryCombination) {
+  const StudyOptions study = read_study_text(
+      "cameras: [misumi-v5506]\ntrajectories: [\"1\"]\nseeds: [3, 5]\n"
+      "recon: {keyframes: {max_gap: 7}}\n"
+      "axes:\n  recon.preprocess.undistort: [true, false]\n  render.sensor.noise: [false]\n"
+      "  frames: [12, 24]\n",
+      "study.yaml");
+  ASSERT_EQ(study.variants.size(), 4u);
+  const std::vector<std::pair<bool, int>> expected = {
+      {true, 12}, {true, 24}, {false, 12}, {false, 24}};
+  for (std::size_t v = 0; v < 4; ++v) {
+    const Variant& variant = study.variants[v];
+    EXPECT_EQ(variant.recon.preprocess.undistort, expected[v].first);
+    EXPECT_EQ(variant.simulate.frames, expected[v].second);
+    EXPECT_FALSE(variant.simulate.render.sensor.noise);
+    EXPECT_EQ(variant.recon.keyframes.max_gap, 7);
+  }
+  const auto cells = cells_of(study);
+  ASSERT_EQ(cells.size(), 8u);
+  EXPECT_EQ(cells[3].title(),
+            "misumi-v5506, trajectory 1, paper, recon.preprocess.undistort=true, "
+            "render.sensor.noise=false, frames=24, seed 5");
+  EXPECT_EQ(cells[3].name(), "misumi-v5506_1_paper_v2_seed5");
+}
+
+TEST(StudyFile, ABadAxisIsNamedWithItsPlace) {
+  const auto axes = [](const std::string& text) { return kHead + "axes: {" + text + "}\n"; };
+  EXPECT_EQ(error_of(axes("recon.preprocess.undistrt: [true]")),
+            "study.yaml:3:35: axis recon.preprocess.undistrt=true: unknown key 'undistrt'; did you "
+            "mean 'undistort'?");
+  EXPECT_EQ(error_of(axes("frames: [10, ten]")),
+            "study.yaml:3:16: axis frames=ten: frames is 'ten', expected a whole number");
+  EXPECT_EQ(error_of(axes("frames: []")),
+            "study.yaml:3:16: axis 'frames' is empty, expected at least one value");
+  EXPECT_EQ(error_of(axes("frames: [10, 10]")), "study.yaml:3:16: axis 'frames': 10 stands twice");
+  EXPECT_EQ(error_of(axes("frames.more: [10]")),
+            "study.yaml:3:21: axis frames.more=10: frames is a mapping, expected a whole number");
+  EXPECT_EQ(
+      error_of(axes("cameras: [misumi-v3506]")),
+      "study.yaml:3:17: axis 'cameras': cameras, trajectories, methods and seeds have lists of "
+      "their own");
+  EXPECT_EQ(error_of(axes("rendr.sensor.noise: [true]")),
+            "study.yaml:3:28: axis 'rendr.sensor.noise': no such setting, expected one of: render, "
+            "recon, scene, resolution, frames; did you mean 'render'?");
+  EXPECT_EQ(error_of(kHead + "seeds: [1, 2, 1]\n"), "study.yaml:3:8: seed 1 stands twice");
+  EXPECT_EQ(error_of(kHead + "seed: 1\nseeds: [2]\n"),
+            "study.yaml:4:8: seed and seeds, expected one of them");
+}
+
+TEST(StudyFile, AGateCanHoldForSomeOfTheAxes) {
+  const std::string head = kHead + "axes: {frames: [12, 24]}\n";
+  const auto gate = [&](const std::string& where) {
+    return head + "gates: [{metric: a.b, below: 1, reason: why, where: {" + where + "}}]\n";
+  };
+  const StudyOptions study = read_study_text(gate("frames: 24"), "study.yaml");
+  ASSERT_EQ(study.gates.size(), 1u);
+  EXPECT_EQ(study.gates[0].settings, (std::vector<Setting>{{"frames", "24"}}));
+  EXPECT_EQ(error_of(gate("frames: 25")),
+            "study.yaml:4:62: 25 is no value of the axis 'frames': 12, 24");
+  EXPECT_EQ(error_of(gate("frame: 24")),
+            "study.yaml:4:61: 'frame' is no axis of the study; did you mean 'frames'?");
 }
 
 }  // namespace

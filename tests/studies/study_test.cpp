@@ -110,5 +110,31 @@ TEST_F(Study, AnUnknownKeyStopsItBeforeAnyWork) {
   EXPECT_FALSE(fs::exists(folder_ / "out"));
 }
 
+// Two settings of the reconstruction share their frames; seeds do not.
+TEST_F(Study, CellsShareWhatIsTheSame) {
+  const fs::path file = write_study(
+      "seeds: [1, 2]\naxes: {recon.keyframes.mean_flow_px: [20, 30]}\n"
+      "gates: [{metric: tracking.frames, above: 11, reason: all there, where: "
+      "{recon.keyframes.mean_flow_px: 20}}]\n");
+  const StudyResult result = run(file);
+  EXPECT_EQ(result.cells, 4);
+  EXPECT_TRUE(result.failed_gates.empty());
+  const json results = json::parse(read_text(folder_ / "out" / "results.json"));
+  const json& cells = results.at("cells");
+  EXPECT_EQ(cells.at(0).at("dataset"), cells.at(2).at("dataset"));
+  EXPECT_NE(cells.at(0).at("dataset"), cells.at(1).at("dataset"));
+  EXPECT_NE(cells.at(0).at("estimate"), cells.at(2).at("estimate"));
+  EXPECT_EQ(cells.at(3).at("axes").at("recon.keyframes.mean_flow_px"), "30");
+  EXPECT_EQ(cells.at(3).at("seed"), 2);
+  EXPECT_EQ(results.at("gates").size(), 2u);
+  EXPECT_NE(read_text(folder_ / "out" / "repeats.csv").find("tracking.tracked_share"),
+            std::string::npos);
+  EXPECT_NE(read_text(folder_ / "out" / "junit.xml").find("tests=\"2\" failures=\"0\""),
+            std::string::npos);
+  EXPECT_NE(
+      read_text(folder_ / "out" / "report.html").find("recon.keyframes.mean_flow_px=30, seed 2"),
+      std::string::npos);
+}
+
 }  // namespace
 }  // namespace rugae
