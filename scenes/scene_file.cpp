@@ -8,9 +8,9 @@
 
 #include "core/check.h"
 #include "core/like.h"
+#include "core/portable_math.h"
 #include "core/random.h"
 #include "core/yaml.h"
-#include "scenes/portable_math.h"
 
 namespace rugae {
 namespace {
