@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "core/portable_math.h"
 #include "core/presets.h"
 #include "core/units.h"
 #include "core/yaml.h"
@@ -21,7 +22,8 @@ double focal_for_fov(Lens lens, double fov_rad) {
   lens.fx = lens.fy = 1.0;
   lens.cx = lens.cy = 0.0;
   const double half = 0.5 * fov_rad;
-  const auto border = lens.project(Vec3(std::sin(half), 0.0, std::cos(half)));
+  const SineCosine of_half = portable_sin_cos(half);
+  const auto border = lens.project(Vec3(of_half.sine, 0.0, of_half.cosine));
   check(border.has_value(),
         "a horizontal field of view of {} degrees is beyond the distortion's turning point",
         deg_from_rad(fov_rad));

@@ -67,7 +67,7 @@ class LensProjector {
 
  private:
   Lens lens_;
-  double max_angle_rad_;
+  double limit_;  // of the radial mapping's argument
   double cos_limit_;
 };
 

@@ -1,13 +1,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <limits>
-#include <unsupported/Eigen/Polynomials>
 #include <vector>
 
 #include "cameras/camera.h"
 #include "core/check.h"
+#include "core/portable_math.h"
 #include "core/units.h"
 
 namespace rugae {
@@ -16,22 +15,53 @@ namespace {
 constexpr double kNewtonTolerance = 1e-12;  // in normalised coordinates or radians
 constexpr int kNewtonSteps = 50;
 
-// Smallest positive root of 1 + c1 s + c2 s^2 + ..., the derivative of the radial mapping over s =
-// r^2; infinity if there is none.
-double first_turning_point(std::initializer_list<double> coefficients) {
-  std::vector<double> c = {1.0};
-  c.insert(c.end(), coefficients);
-  while (c.size() > 1 && c.back() == 0.0) c.pop_back();
-  double smallest = std::numeric_limits<double>::infinity();
-  if (c.size() == 1) return smallest;
-  if (c.size() == 2) return c[1] < 0.0 ? -1.0 / c[1] : smallest;
-  const Eigen::VectorXd polynomial =
-      Eigen::Map<const Eigen::VectorXd>(c.data(), static_cast<Eigen::Index>(c.size()));
+double polynomial_at(const std::vector<double>& coefficients, double s) {
+  double sum = 0.0;
+  for (auto c = coefficients.rbegin(); c != coefficients.rend(); ++c) sum = sum * s + *c;
+  return sum;
+}
+
+// Where c0 + c1 s + c2 s^2 + ... changes its sign between 0 and `most`. It is monotonic between the
+// roots of its derivative, so bisection finds each.
+std::vector<double> sign_changes(const std::vector<double>& c, double most) {
   std::vector<double> roots;
-  Eigen::PolynomialSolver<double, Eigen::Dynamic>(polynomial).realRoots(roots, 1e-9);
-  for (double root : roots)
-    if (root > 0.0) smallest = std::min(smallest, root);
-  return smallest;
+  if (c.size() < 2) return roots;
+  std::vector<double> derivative;
+  for (std::size_t k = 1; k < c.size(); ++k) derivative.push_back(static_cast<double>(k) * c[k]);
+  std::vector<double> stops = sign_changes(derivative, most);
+  stops.push_back(most);
+  double from = 0.0;
+  for (const double to : stops) {
+    const bool starts_below = polynomial_at(c, from) < 0.0;
+    if (starts_below != (polynomial_at(c, to) < 0.0)) {
+      double low = from, high = to, middle = 0.5 * (low + high);
+      for (; middle > low && middle < high; middle = 0.5 * (low + high))
+        ((polynomial_at(c, middle) < 0.0) == starts_below ? low : high) = middle;
+      roots.push_back(high);
+    }
+    from = to;
+  }
+  return roots;
+}
+
+// The largest argument of the radial mapping to which it is monotonic, at most `most`; the
+// coefficients are those of its derivative over s, the argument's square.
+double monotonic_to(const std::vector<double>& derivative, double most) {
+  const std::vector<double> turns = sign_changes(derivative, most * most);
+  return turns.empty() ? most : std::sqrt(turns.front());
+}
+
+// The radial mapping's argument is the tangent of the angle, or with a fisheye the angle, rad.
+double largest_argument(const Lens& lens) {
+  constexpr double kLargestTangent = 999.9996666666933;  // 1e-3 rad short of 90 degrees
+  if (lens.model == LensModel::kannala_brandt)
+    return monotonic_to({1.0, 3.0 * lens.k1, 5.0 * lens.k2, 7.0 * lens.k3, 9.0 * lens.k4}, kPi);
+  return monotonic_to({1.0, 3.0 * lens.k1, 5.0 * lens.k2, 7.0 * lens.k3}, kLargestTangent);
+}
+
+double cosine_at(const Lens& lens, double argument) {
+  if (lens.model == LensModel::kannala_brandt) return portable_sin_cos(argument).cosine;
+  return 1.0 / std::sqrt(1.0 + argument * argument);
 }
 
 // Brown-Conrady: d = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + tangential(x), with
@@ -73,13 +103,12 @@ double kannala_brandt_slope(const Lens& lens, double theta) {
 
 // Newton's method from a start inside the monotonic region; the step is halved while it leaves the
 // region or makes the residual grow, so that the wanted root is the one found.
-std::optional<Vec2> undistort(const Lens& lens, double max_angle_rad, const Vec2& target) {
-  const double limit = std::tan(max_angle_rad);
+std::optional<Vec2> undistort(const Lens& lens, double limit, const Vec2& target) {
   Vec2 n = target;
   // The radial part alone gives a start inside the region for any strength of barrel or pincushion.
   const double r_target = target.norm();
   if (r_target > 0.0) {
-    double low = 0.0, high = std::min(limit, 1e3);
+    double low = 0.0, high = limit;
     for (int k = 0; k < 30; ++k) {
       const double r = 0.5 * (low + high), r2 = r * r;
       const double mapped = r * (1.0 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3)));
@@ -114,11 +143,8 @@ std::optional<Vec2> undistort(const Lens& lens, double max_angle_rad, const Vec2
 }  // namespace
 
 double Lens::max_angle_rad() const {
-  if (model == LensModel::kannala_brandt)
-    return std::min(kPi, std::sqrt(first_turning_point({3.0 * k1, 5.0 * k2, 7.0 * k3, 9.0 * k4})));
-  constexpr double kNearlyRight = 1e-3;  // rad short of 90 degrees, where r is a thousand
-  const double r_limit = std::sqrt(first_turning_point({3.0 * k1, 5.0 * k2, 7.0 * k3}));
-  return std::min(kPi / 2.0 - kNearlyRight, std::atan(r_limit));
+  const double limit = largest_argument(*this);
+  return model == LensModel::kannala_brandt ? limit : portable_atan2(limit, 1.0);
 }
 
 std::optional<Vec2> Lens::project(const Vec3& p_cam) const {
@@ -130,7 +156,7 @@ std::optional<Vec3> Lens::unproject(const Vec2& pixel) const {
 }
 
 LensProjector::LensProjector(const Lens& lens)
-    : lens_(lens), max_angle_rad_(lens.max_angle_rad()), cos_limit_(std::cos(max_angle_rad_)) {}
+    : lens_(lens), limit_(largest_argument(lens)), cos_limit_(cosine_at(lens, limit_)) {}
 
 std::optional<Vec2> LensProjector::project(const Vec3& p) const {
   const double norm = p.norm();
@@ -140,9 +166,9 @@ std::optional<Vec2> LensProjector::project(const Vec3& p) const {
   if (lens_.model == LensModel::brown_conrady) {
     d = distorted(lens_, {p.x() / p.z(), p.y() / p.z()});
   } else {
-    const double r = std::hypot(p.x(), p.y());
+    const double r = p.head<2>().norm();
     if (r == 0.0) return Vec2(lens_.cx, lens_.cy);
-    d = kannala_brandt(lens_, std::atan2(r, p.z())) / r * Vec2(p.x(), p.y());
+    d = kannala_brandt(lens_, portable_atan2(r, p.z())) / r * Vec2(p.x(), p.y());
   }
   return Vec2(lens_.fx * d.x() + lens_.cx, lens_.fy * d.y() + lens_.cy);
 }
@@ -151,15 +177,14 @@ std::optional<Vec3> LensProjector::unproject(const Vec2& pixel) const {
   const Vec2 d((pixel.x() - lens_.cx) / lens_.fx, (pixel.y() - lens_.cy) / lens_.fy);
   if (!d.allFinite()) return std::nullopt;
   if (lens_.model == LensModel::brown_conrady) {
-    const auto n = undistort(lens_, max_angle_rad_, d);
+    const auto n = undistort(lens_, limit_, d);
     if (!n) return std::nullopt;
     return Vec3(n->x(), n->y(), 1.0).normalized();
   }
   const double theta_d = d.norm();
   if (theta_d == 0.0) return Vec3::UnitZ();
-  const double limit = max_angle_rad_;
-  if (!(theta_d <= kannala_brandt(lens_, limit))) return std::nullopt;
-  double low = 0.0, high = limit, theta = std::min(theta_d, limit);
+  if (!(theta_d <= kannala_brandt(lens_, limit_))) return std::nullopt;
+  double low = 0.0, high = limit_, theta = std::min(theta_d, limit_);
   for (int step = 0; step < kNewtonSteps; ++step) {
     const double residual = kannala_brandt(lens_, theta) - theta_d;
     (residual > 0.0 ? high : low) = theta;
@@ -167,11 +192,12 @@ std::optional<Vec3> LensProjector::unproject(const Vec2& pixel) const {
     if (!(next >= low && next <= high)) next = 0.5 * (low + high);
     const double change = std::abs(next - theta);
     theta = next;
-    if (change <= 1e-16 * limit) break;
+    if (change <= 1e-16 * limit_) break;
   }
   if (!(std::abs(kannala_brandt(lens_, theta) - theta_d) <= kNewtonTolerance)) return std::nullopt;
-  const double s = std::sin(theta) / theta_d;
-  return Vec3(s * d.x(), s * d.y(), std::cos(theta));
+  const SineCosine of_theta = portable_sin_cos(theta);
+  const double s = of_theta.sine / theta_d;
+  return Vec3(s * d.x(), s * d.y(), of_theta.cosine);
 }
 
 Mat3 Lens::matrix() const {
@@ -213,7 +239,7 @@ double vignette_at(const Vignetting& vignetting, const Lens& lens, const Vec2& p
 
 double vignette_at(const Vignetting& vignetting, const Lens& lens, const Vec2& pixel,
                    const Vec3& ray) {
-  const double half_diagonal = 0.5 * std::hypot(lens.width, lens.height);
+  const double half_diagonal = 0.5 * Vec2(lens.width, lens.height).norm();
   const double r2 =
       (pixel - Vec2(lens.cx, lens.cy)).squaredNorm() / (half_diagonal * half_diagonal);
   const double polynomial = 1.0 + r2 * (vignetting.v1 + r2 * (vignetting.v2 + r2 * vignetting.v3));

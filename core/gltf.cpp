@@ -5,13 +5,14 @@
 #define TINYGLTF_NO_EXTERNAL_IMAGE
 #include <tiny_gltf.h>
 
-#include <cmath>
+#include <algorithm>
 #include <cstring>
 #include <sstream>
 
 #include "core/check.h"
 #include "core/files.h"
 #include "core/mesh_io.h"
+#include "core/portable_math.h"
 
 namespace rugae {
 namespace {
@@ -53,7 +54,8 @@ int add_vectors(tinygltf::Model& model, const std::vector<Vec3f>& vectors) {
 
 // glTF vertex colours are linear.
 float linear_from_srgb(float c) {
-  return c <= 0.04045f ? c / 12.92f : std::pow((c + 0.055f) / 1.055f, 2.4f);
+  if (c <= 0.04045f) return c / 12.92f;
+  return static_cast<float>(portable_power(std::min((c + 0.055) / 1.055, 1.0), 2.4));
 }
 
 }  // namespace

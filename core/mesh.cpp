@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/check.h"
+#include "core/portable_math.h"
 
 namespace rugae {
 namespace {
@@ -101,7 +102,7 @@ std::vector<Vec3f> angle_weighted_normals(const TriangleMesh& mesh) {
     for (int k = 0; k < 3; ++k) {
       const Vec3 u = mesh.vertices[i[(k + 1) % 3]] - mesh.vertices[i[k]];
       const Vec3 v = mesh.vertices[i[(k + 2) % 3]] - mesh.vertices[i[k]];
-      sums[i[k]] += std::atan2(u.cross(v).norm(), u.dot(v)) * n;
+      sums[i[k]] += portable_atan2(u.cross(v).norm(), u.dot(v)) * n;
     }
   }
   std::vector<Vec3f> normals(sums.size());

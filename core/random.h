@@ -57,7 +57,8 @@ inline std::array<double, 4> random_uniform(std::uint64_t seed, Purpose purpose,
   return {uniform01(w[0]), uniform01(w[1]), uniform01(w[2]), uniform01(w[3])};
 }
 
-/// Four independent standard normal numbers, by the Box-Muller transform.
+/// Four independent standard normal numbers, by the Box-Muller transform. For tests: the last bits
+/// are those of the machine's mathematics library.
 inline std::array<double, 4> random_normal(std::uint64_t seed, Purpose purpose, std::uint32_t frame,
                                            std::uint64_t index) {
   const auto u = random_uniform(seed, purpose, frame, index);

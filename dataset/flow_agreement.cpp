@@ -2,17 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
 
 #include "core/check.h"
 #include "dataset/check_labels.h"
+#include "dataset/flow_explanations.h"
 #include "dataset/image_io.h"
 #include "dataset/label_values.h"
 #include "dataset/moving_wall.h"
-#include "dataset/pose_mistakes.h"
 #include "dataset/warp.h"
 
 namespace rugae {
@@ -26,111 +25,6 @@ constexpr double kFlowAgreement_px = 0.01;
 constexpr double kMedianAgreement_px = 0.001;
 constexpr int kSamplesAcross = 24;  // of the grid on which depth, pose and flow are compared
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-
-// A way to read the files: which depth, poses and flow stand for the frame.
-struct Reading {
-  int depth_of = 0, poses_of = 0, flow_of = 0, wall_of = 0;  // frames later
-  int flow_to = 1;                                           // the frame the flow leads to
-  DepthKind kind = DepthKind::z;
-  double depth_factor = 1.0;
-  double flow_sign = 1.0;
-  bool flow_swapped = false;
-  std::function<Rigid3(const Rigid3&)> pose;  // empty: as it is
-};
-
-enum class Part { depth, poses, flow };
-
-struct Mistake {
-  Part part;
-  std::string text;
-  using Undo = std::function<void(Reading&)>;
-  std::vector<Undo> undos;  // ways to undo it, of which one may do where another finds no files
-  bool shift = false;
-};
-
-// One mistake or two.
-struct Explanation {
-  std::vector<const Mistake*> mistakes;
-  std::string text() const {
-    if (mistakes.size() == 1) return mistakes[0]->text;
-    return fmt::format("two mistakes at once: {}, and {}", mistakes[0]->text, mistakes[1]->text);
-  }
-  std::vector<Reading> readings() const {
-    std::vector<Reading> all = {{}};
-    for (const Mistake* mistake : mistakes) {
-      std::vector<Reading> next;
-      for (const Reading& reading : all)
-        for (const Mistake::Undo& undo : mistake->undos) undo(next.emplace_back(reading));
-      all = std::move(next);
-    }
-    return all;
-  }
-};
-
-// One part is that of another frame: its file `by` frames later belongs to this frame, or the file
-// of this frame to all other parts that many frames before.
-Mistake shifted(Part part, const std::string& what, int by) {
-  const auto of = [part](Reading& r) -> int& {
-    return part == Part::depth ? r.depth_of : part == Part::poses ? r.poses_of : r.flow_of;
-  };
-  return {
-      part,
-      fmt::format("the {} shifted by one frame: {} of the {}", what,
-                  part == Part::poses ? "those" : "that", by < 0 ? "frame before" : "next frame") +
-          (part == Part::poses ? " fit" : " fits"),
-      {[of, by](Reading& r) { of(r) += by; },
-       [of, by](Reading& r) {
-         for (int* other : {&r.depth_of, &r.poses_of, &r.flow_of, &r.wall_of}) *other -= by;
-         of(r) += by;
-       }},
-      true};
-}
-
-std::vector<Mistake> all_mistakes() {
-  std::vector<Mistake> mistakes = {
-      {Part::flow, "the flow's sign is flipped", {[](Reading& r) { r.flow_sign = -r.flow_sign; }}},
-      {Part::flow, "the flow's x and y are swapped", {[](Reading& r) { r.flow_swapped = true; }}},
-      {Part::flow, "the flow leads to the frame before, not to the next", {[](Reading& r) {
-         r.flow_to = -1;
-       }}},
-      {Part::depth, "the depth is the distance along the ray, not along z", {[](Reading& r) {
-         r.kind = DepthKind::range;
-       }}}};
-  for (const PoseMistake& mistake : pose_mistakes()) {
-    mistakes.push_back(
-        {Part::poses, "the poses are wrong: " + mistake.text, {[undo = mistake.undo](Reading& r) {
-           const auto first = r.pose;
-           r.pose = [undo, first](const Rigid3& p) { return undo(first ? first(p) : p); };
-         }}});
-    // a moving wall tells which of the two lengths is meant
-    if (mistake.factor != 1.0)
-      mistakes.back().undos.push_back(
-          [factor = mistake.factor](Reading& r) { r.depth_factor /= factor; });
-  }
-  for (const int by : {-1, 1}) {
-    mistakes.push_back(shifted(Part::depth, "depth is", by));
-    mistakes.push_back(shifted(Part::flow, "flow is", by));
-    mistakes.push_back(shifted(Part::poses, "poses are", by));
-  }
-  return mistakes;
-}
-
-// Single mistakes first, then two at once: of two parts, or both of the poses, in either order. Two
-// shifts of the poses may undo each other, and then everything is that of another frame.
-const std::vector<Explanation>& explanations() {
-  static const std::vector<Mistake> mistakes = all_mistakes();
-  static const std::vector<Explanation> all = [] {
-    std::vector<Explanation> list;
-    for (const Mistake& m : mistakes) list.push_back({{&m}});
-    for (const Mistake& a : mistakes)
-      for (const Mistake& b : mistakes)
-        if (a.part < b.part ||
-            (&a != &b && a.part == Part::poses && b.part == Part::poses && !(a.shift && b.shift)))
-          list.push_back({{&a, &b}});
-    return list;
-  }();
-  return all;
-}
 
 // One pixel of the comparison: where it lies and its ray.
 struct Sample {
@@ -178,13 +72,13 @@ class Comparison {
   }
 
   // Of every sample, px; infinite where the point cannot be seen. Sorted.
-  std::vector<double> errors_px(const Reading& reading) {
+  std::vector<double> errors_px(const FilesReading& reading) {
     return errors_px(reading, false, samples_.size());
   }
 
   // In another frame some labels are not known, and where rounding decides what is seen they are
   // wrong: of a tenth of those that are known nothing is asked.
-  bool fits(const Reading& reading) {
+  bool fits(const FilesReading& reading) {
     std::vector<double> errors = errors_px(reading, true, samples_.size() / 10);
     if (2 * errors.size() < samples_.size()) return false;
     errors.resize((errors.size() * 9 + 9) / 10);
@@ -199,7 +93,7 @@ class Comparison {
  private:
   // With `known`, of the samples whose labels are known. Gives up, without any errors, when more
   // than `may_fail` are too large.
-  std::vector<double> errors_px(const Reading& reading, bool known, std::size_t may_fail) {
+  std::vector<double> errors_px(const FilesReading& reading, bool known, std::size_t may_fail) {
     const int to = index_ + reading.flow_to;
     const auto now = rows(index_ + reading.poses_of), next = rows(to + reading.poses_of);
     const cv::Mat depth = image(depths_, index_ + reading.depth_of, &DatasetLayout::depth),
@@ -222,7 +116,7 @@ class Comparison {
   }
 
   double error_px(const Sample& sample, const RowPoses& now, const RowPoses& next, int to,
-                  const cv::Mat& depth, const cv::Mat& flow, const Reading& reading) {
+                  const cv::Mat& depth, const cv::Mat& flow, const FilesReading& reading) {
     const Vec3 point = lifted(sample, now, depth, reading);
     if (!point.allFinite()) return kInfinite;
     const double fps = in_.camera ? in_.camera->sensor.fps : 0.0;
@@ -250,12 +144,12 @@ class Comparison {
   }
 
   static Vec3 lifted(const Sample& sample, const RowPoses& rows, const cv::Mat& depth,
-                     const Reading& reading) {
+                     const FilesReading& reading) {
     const double depth_mm = reading.depth_factor * depth.at<float>(sample.y, sample.x);
     return rows.of_row(sample.y) *
            (sample.ray * (reading.kind == DepthKind::z ? depth_mm / sample.ray.z() : depth_mm));
   }
-  std::vector<Vec3> points(const Reading& reading, const RowPoses& rows) {
+  std::vector<Vec3> points(const FilesReading& reading, const RowPoses& rows) {
     std::vector<Vec3> list;
     for (const Sample& sample : samples_)
       list.push_back(lifted(sample, rows, depths_.at(index_), reading));
@@ -283,7 +177,7 @@ class Comparison {
                         : RowPoses(in_.track[static_cast<std::size_t>(frame)].world_from_camera))
                 .first->second;
   }
-  static RowPoses read_as(const RowPoses& rows, const Reading& reading) {
+  static RowPoses read_as(const RowPoses& rows, const FilesReading& reading) {
     if (!reading.pose) return rows;
     std::vector<Rigid3> poses;
     for (const Rigid3& pose : rows.poses()) poses.push_back(reading.pose(pose));
@@ -329,12 +223,12 @@ FlowAgreement compare_flow(const LabelSources& in, int index, const cv::Mat& dep
   result.agrees = agree(errors);
   if (result.agrees || clamped_at_px(flow_px)) return result;
   comparison.look_everywhere();
-  const std::vector<Explanation>& all = explanations();
+  const std::vector<FlowExplanation>& all = flow_explanations();
   for (std::size_t i = 0; i < all.size(); ++i) {
     // two at once only where no single one will do
-    if (all[i].mistakes.size() > 1 && !result.fits.empty()) break;
-    if (std::ranges::any_of(all[i].readings(),
-                            [&](const Reading& reading) { return comparison.fits(reading); }))
+    if (all[i].two_at_once && !result.fits.empty()) break;
+    if (std::ranges::any_of(all[i].readings,
+                            [&](const FilesReading& reading) { return comparison.fits(reading); }))
       result.fits.push_back(static_cast<int>(i));
   }
   return result;
@@ -381,7 +275,7 @@ std::vector<std::string> tell_disagreements(const DatasetLayout& layout, const P
     const FlowAgreement* first = *std::ranges::find_if(left, by_this);
     const std::string text = most == votes.end()
                                  ? left_over(layout, track, *first)
-                                 : explanations()[static_cast<std::size_t>(most->first)].text();
+                                 : flow_explanations()[static_cast<std::size_t>(most->first)].text;
     told.push_back({first, static_cast<std::size_t>(std::erase_if(left, by_this)), text});
   }
   std::ranges::sort(told, {}, [](const Told& t) { return t.first->index; });

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "scenes/portable_math.h"
+#include "core/portable_math.h"
 
 namespace rugae {
 

@@ -5,16 +5,12 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/check.h"
-#include "scenes/portable_math.h"
+#include "core/portable_math.h"
 
 namespace rugae {
 namespace {
 
 constexpr double kMostWhiteBalance = 4.0;  // assumed: two stops
-
-double power(double base, double exponent) {  // for 0 < base <= 1
-  return portable_exp(std::min(0.0, exponent * portable_log(base)));
-}
 
 }  // namespace
 
@@ -53,9 +49,10 @@ double display_value(Tone tone, double linear) {
   linear = std::clamp(linear, 0.0, 1.0);
   switch (tone) {
     case Tone::srgb:
-      return linear <= 0.0031308 ? 12.92 * linear : 1.055 * power(linear, 1.0 / 2.4) - 0.055;
+      return linear <= 0.0031308 ? 12.92 * linear
+                                 : 1.055 * portable_power(linear, 1.0 / 2.4) - 0.055;
     case Tone::gamma22:
-      return linear <= 0.0 ? 0.0 : power(linear, 1.0 / 2.2);
+      return linear <= 0.0 ? 0.0 : portable_power(linear, 1.0 / 2.2);
     case Tone::linear:
       break;
   }

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "core/portable_math.h"
 #include "core/random.h"
-#include "scenes/portable_math.h"
 
 namespace rugae {
 namespace {

@@ -2,7 +2,7 @@
 // The capsule's lights in the world (cameras/emitter.h has the model).
 
 #include "cameras/emitter.h"
-#include "scenes/portable_math.h"
+#include "core/portable_math.h"
 
 namespace rugae {
 

@@ -6,11 +6,11 @@
 #include <cstdint>
 
 #include "core/check.h"
+#include "core/portable_math.h"
 #include "core/types.h"
 #include "core/units.h"
 #include "render/isp.h"
 #include "render/radiance.h"
-#include "scenes/portable_math.h"
 
 namespace rugae {
 namespace {
@@ -143,8 +143,7 @@ Exposure ExposureControl::next(int frame, const Exposure& metered,
   const double before_s = frame == 0 ? wanted_s : total(earlier(frame - 1).used);
   // (wanted / before)^(1 - smoothing), from the quotient that is at most 1
   const double quotient = std::min(wanted_s, before_s) / std::max(wanted_s, before_s);
-  const double step =
-      portable_exp(std::min(0.0, (1.0 - settings_.smoothing) * portable_log(quotient)));
+  const double step = portable_power(quotient, 1.0 - settings_.smoothing);
   return metering_.split(wanted_s < before_s ? before_s * step : before_s / step);
 }
 

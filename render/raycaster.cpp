@@ -1,15 +1,14 @@
 #include "render/raycaster.h"
 
 #include <embree3/rtcore.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <mutex>
 
 #include "core/check.h"
+#include "render/hierarchy.h"
 
 namespace rugae {
 namespace {
@@ -70,12 +69,7 @@ void set_ray(Ray& ray, int lane, const Vec3& origin, const Vec3& direction, doub
   ray.flags[lane] = 0;
 }
 
-// The traversal computes in single precision, each instruction set in its own way: near an outline
-// some propose the fold and some the wall behind it. So it is given walls that are thicker by
-// somewhat more than its rounding (on the side of the lumen, against the winding's normals): it
-// proposes every fold that the exact ray meets, and some that the exact ray passes, which are
-// refused.
-constexpr double kSwell = 1e-6;  // of the wall's diameter: 16 roundings
+constexpr double kSwell = 1e-6;  // of the wall's diameter: 16 roundings of the traversal
 
 // What a ray is traced against.
 struct Target {
@@ -193,51 +187,6 @@ void occlusion_packets(const Target& target, std::span<const Eye> eyes,
   }
 }
 
-// A hierarchy over the triangles; one or three lists of vertices, the latter for walls that move
-// while rays are sent.
-struct Hierarchy {
-  RTCScene scene = nullptr;
-  RTCGeometry geometry = nullptr;
-  std::array<float*, 3> vertices{};
-  unsigned steps = 1;
-};
-
-std::vector<Vec3f> swelling(const std::vector<Vec3>& vertices, const std::vector<Vec3i>& triangles,
-                            double swell_mm) {
-  std::vector<Vec3f> swell(vertices.size(), Vec3f::Zero());
-  for (const Vec3i& t : triangles) {
-    const Vec3& a = vertices[t[0]];
-    const Vec3f out = (vertices[t[1]] - a).cross(vertices[t[2]] - a).cast<float>();
-    for (int k = 0; k < 3; ++k) swell[t[k]] -= out;
-  }
-  for (Vec3f& s : swell) {
-    const float norm = s.norm();
-    s *= norm > 0.0f ? static_cast<float>(swell_mm) / norm : 0.0f;
-  }
-  return swell;
-}
-
-void set_vertices(const Hierarchy& h, const std::array<const std::vector<Vec3>*, 3>& lists,
-                  const std::vector<Vec3f>& swell, const Vec3& center) {
-  for (unsigned step = 0; step < h.steps; ++step) {
-    float* out = h.vertices[step];
-    for (std::size_t v = 0; v < lists[step]->size(); ++v)
-      for (int k = 0; k < 3; ++k)
-        *out++ = static_cast<float>((*lists[step])[v][k] - center[k] + swell[v][k]);
-  }
-}
-
-void commit(const Hierarchy& h, std::size_t triangles, RTCDevice device) {
-  // The library's tasks run in the caller's threads; these are not to take up other frames' tasks.
-  tbb::this_task_arena::isolate([&] {
-    rtcCommitGeometry(h.geometry);
-    rtcCommitScene(h.scene);
-  });
-  const RTCError error = rtcGetDeviceError(device);
-  check(error == RTC_ERROR_NONE, "ray tracing: building over {} triangles failed (error {})",
-        triangles, static_cast<int>(error));
-}
-
 }  // namespace
 
 // What is shared by all that was made from one mesh at rest.
@@ -261,34 +210,11 @@ struct Raycaster::Shared {
     if (device) rtcReleaseDevice(device);
   }
 
-  // A hierarchy without vertices yet.
   Hierarchy make(unsigned steps, bool refitted) const {
-    Hierarchy h;
-    h.steps = steps;
-    h.scene = rtcNewScene(device);
-    rtcSetSceneFlags(
-        h.scene, refitted ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_ROBUST);
-    rtcSetSceneBuildQuality(h.scene, steps > 1 ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
-    h.geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    if (refitted) rtcSetGeometryBuildQuality(h.geometry, RTC_BUILD_QUALITY_REFIT);
-    rtcSetGeometryTimeStepCount(h.geometry, steps);
-    bool filled = true;
-    for (unsigned step = 0; step < steps; ++step) {
-      h.vertices[step] = static_cast<float*>(
-          rtcSetNewGeometryBuffer(h.geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3,
-                                  3 * sizeof(float), vertex_count));
-      filled = filled && h.vertices[step];
-    }
-    auto* indices = static_cast<unsigned*>(
-        rtcSetNewGeometryBuffer(h.geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                3 * sizeof(unsigned), triangles->size()));
-    check(filled && indices != nullptr, "ray tracing: no memory for {} triangles",
-          triangles->size());
-    for (const Vec3i& t : *triangles)
-      for (int k = 0; k < 3; ++k) *indices++ = static_cast<unsigned>(t[k]);
-    rtcAttachGeometry(h.scene, h.geometry);
-    rtcReleaseGeometry(h.geometry);  // the scene holds it
-    return h;
+    return make_hierarchy(device, *triangles, vertex_count, steps, refitted);
+  }
+  void place(const Hierarchy& h, const VertexLists& lists) const {
+    place_vertices(h, device, lists, *triangles, center, swell_mm);
   }
 };
 
@@ -322,9 +248,7 @@ Raycaster::Raycaster(const TriangleMesh& mesh, const std::string& device) {
   else if (rtcGetDeviceProperty(shared.device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED))
     shared.packet_size = 8;
   state_->hierarchy = shared.make(1, false);
-  set_vertices(state_->hierarchy, {&mesh.vertices},
-               swelling(mesh.vertices, mesh.triangles, shared.swell_mm), shared.center);
-  commit(state_->hierarchy, mesh.triangles.size(), shared.device);
+  shared.place(state_->hierarchy, {&mesh.vertices});
 }
 
 Raycaster::Raycaster(const Raycaster& rest, const VertexMotion& vertices)
@@ -344,14 +268,10 @@ Raycaster::Raycaster(const Raycaster& rest, const VertexMotion& vertices)
     }
   }
   if (!h.scene) h = shared.make(steps, true);
-  const std::vector<Vec3f> swell = swelling(*vertices.now, *shared.triangles, shared.swell_mm);
   if (steps == 1)
-    set_vertices(h, {vertices.now}, swell, shared.center);
+    shared.place(h, {vertices.now});
   else
-    set_vertices(h, {vertices.before, vertices.now, vertices.after}, swell, shared.center);
-  for (unsigned step = 0; step < steps; ++step)
-    rtcUpdateGeometryBuffer(h.geometry, RTC_BUFFER_TYPE_VERTEX, step);
-  commit(h, shared.triangles->size(), shared.device);
+    shared.place(h, {vertices.before, vertices.now, vertices.after});
 }
 
 Raycaster::~Raycaster() = default;

@@ -1,5 +1,5 @@
 #pragma once
-// Rays against the wall. The only place that knows the ray tracing library.
+// Rays against the wall. This and render/hierarchy alone know the ray tracing library.
 
 #include <cstdint>
 #include <memory>

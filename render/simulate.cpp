@@ -1,25 +1,18 @@
 #include "render/simulate.h"
 
-#include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <condition_variable>
-#include <future>
-#include <memory>
-#include <mutex>
-#include <optional>
+#include <chrono>
 
 #include "core/check.h"
 #include "core/files.h"
 #include "core/units.h"
 #include "dataset/writer.h"
 #include "render/clearance.h"
-#include "render/exposure_log.h"
-#include "render/frame.h"
+#include "render/frame_loop.h"
 #include "render/scene_truth.h"
 #include "render/sensor.h"
-#include "render/thread_clock.h"
 #include "render/tracks.h"
 #include "trajectories/trajectory.h"
 
@@ -110,196 +103,6 @@ DatasetInfo info_of(const SimulateOptions& options, int frames, const Camera& ca
   return info;
 }
 
-PoseTrack row_track(const RowPoses& rows, double time_s) {
-  PoseTrack track;
-  for (std::size_t k = 0; rows.rolling() && k < rows.poses().size(); ++k)
-    track.push_back({time_s + rows.offset_s(static_cast<double>(k) - 0.5), rows.poses()[k]});
-  return track;
-}
-
-// Frames go through a pipeline in the arena's threads; the thread that called waits, counts the
-// finished ones, and passes on the wish to stop. Whole frames run side by side, and their tiles too
-// where threads would idle, so few frames use all threads as well.
-class FrameLoop {
- public:
-  // Frames before `first_written` are rendered for their metering alone.
-  FrameLoop(const FrameRenderer& renderer, const Motion& motion, const SensorModel& sensor,
-            const SensorModel& clean_sensor, const ExposureControl& control,
-            const OutputSettings& output, const DatasetWriter& writer, const PoseTrack& track,
-            int first_written, const LensSampling& sampling, bool blurs, ExposureLog* log)
-      : renderer_(renderer),
-        motion_(motion),
-        sensor_(sensor),
-        clean_sensor_(clean_sensor),
-        control_(control),
-        output_(output),
-        writer_(writer),
-        track_(track),
-        first_written_(first_written),
-        sampling_(sampling),
-        blurs_(blurs),
-        log_(log) {}
-
-  void run(const std::vector<int>& frames, int threads, Progress& progress,
-           std::map<int, FrameExposure>& exposures) {
-    exposures_ = &exposures;
-    auto done = std::async(std::launch::async, [&] {
-      const struct Finished {  // also when an exception leaves the pipeline
-        FrameLoop& loop;
-        ~Finished() {
-          const std::lock_guard lock(loop.mutex_);
-          loop.finished_ = true;
-          loop.changed_.notify_one();
-        }
-      } finished{*this};
-      tbb::task_arena arena(threads);
-      arena.execute([&] { pipeline(frames, 2 * static_cast<std::size_t>(threads)); });
-    });
-    try {
-      std::size_t reported = 0;
-      std::unique_lock lock(mutex_);
-      while (!finished_ || reported < rendered_) {
-        changed_.wait(lock, [&] { return finished_ || rendered_ > reported; });
-        const std::size_t now = rendered_;
-        lock.unlock();
-        if (now > reported) progress.step(now - reported);
-        reported = now;
-        lock.lock();
-        if (finished_) break;
-      }
-    } catch (...) {
-      stop_ = true;
-      done.wait();
-      throw;
-    }
-    done.get();
-  }
-
-  RenderTimes times;
-  std::vector<TrackPoint> track_points;  // to be followed
-  std::atomic<double> sensor_s = 0.0, encode_s = 0.0, write_s = 0.0;
-
- private:
-  // A frame between its rendering and its file.
-  struct Shot {
-    int frame = 0;
-    CleanFrame clean;
-    FrameExposure exposure;
-  };
-  using ShotPtr = std::shared_ptr<Shot>;
-
-  // Exposure goes through the frames in order: it may follow those before.
-  void pipeline(const std::vector<int>& frames, std::size_t in_flight) {
-    using tbb::filter_mode;
-    std::size_t next = 0;
-    const auto first =
-        tbb::make_filter<void, int>(filter_mode::serial_in_order, [&](tbb::flow_control& control) {
-          if (next == frames.size() || stop_) {
-            control.stop();
-            return -1;
-          }
-          return frames[next++];
-        });
-    const auto rendered = tbb::make_filter<int, ShotPtr>(filter_mode::parallel,
-                                                         [&](int frame) { return shoot(frame); });
-    const auto exposed =
-        tbb::make_filter<ShotPtr, ShotPtr>(filter_mode::serial_in_order, [&](const ShotPtr& shot) {
-          expose(*shot);
-          return shot;
-        });
-    const auto written = tbb::make_filter<ShotPtr, void>(
-        filter_mode::parallel, [&](const ShotPtr& shot) { finish(*shot); });
-    tbb::parallel_pipeline(in_flight, first & rendered & exposed & written);
-  }
-
-  // What the sharp frame was metered for, gathered over pixel, aperture and exposure.
-  cv::Mat gather(int frame, double exposure_s, std::span<const PixelMaterial> materials) {
-    LensSampling sampling = sampling_;
-    sampling.frame = static_cast<std::uint32_t>(frame);
-    sampling.exposure_s = blurs_ ? exposure_s : 0.0;
-    return renderer_.gather(motion_.view(frame), sampling, &times, materials);
-  }
-
-  ShotPtr shoot(int frame) {
-    const FrameView now = motion_.view(frame);
-    std::optional<FrameView> previous, next;
-    if (frame > 0 && renderer_.needs_previous()) previous = motion_.view(frame - 1);
-    if (frame + 1 < static_cast<int>(track_.size()) && renderer_.needs_next())
-      next = motion_.view(frame + 1);
-    CleanFrame clean =
-        renderer_.render(now, previous ? &*previous : nullptr, next ? &*next : nullptr, &times);
-    clean.truth.row_poses = row_track(now.camera, track_[static_cast<std::size_t>(frame)].time_s);
-    clean.truth.wall_displacement_mm = motion_.displacement_mm(frame);
-    if (!track_points.empty()) clean.truth.tracks = follow_tracks(renderer_, now, track_points);
-    const double start = thread_seconds();
-    const Exposure metered = sensor_.expose(clean.radiance);
-    sensor_s += thread_seconds() - start;
-    return std::make_shared<Shot>(Shot{frame, std::move(clean), {{}, metered}});
-  }
-
-  void expose(Shot& shot) {
-    const std::lock_guard lock(mutex_);
-    const auto known = exposures_->find(shot.frame);
-    shot.exposure.used = known != exposures_->end()
-                             ? known->second.used
-                             : control_.next(shot.frame, shot.exposure.metered, *exposures_);
-    (*exposures_)[shot.frame] = shot.exposure;
-  }
-
-  void finish(Shot& shot) {
-    if (shot.frame >= first_written_) write(shot);
-    const std::lock_guard lock(mutex_);
-    ++rendered_;
-    changed_.notify_one();
-  }
-
-  void write(Shot& shot) {
-    FrameTruth& truth = shot.clean.truth;
-    const Exposure& exposure = shot.exposure.used;
-    const cv::Mat& sharp = shot.clean.radiance;
-    const cv::Mat radiance =
-        sampling_.samples > 1 ? gather(shot.frame, exposure.time_s, shot.clean.materials) : sharp;
-    const SensorImages images =
-        sensor_.digitise(radiance, exposure, shot.frame, truth.masks, output_.adc, &sensor_s);
-    for (cv::Mat* part : {&truth.diffuse, &truth.specular, &truth.indirect})
-      if (!part->empty()) *part = sensor_.relative(*part, exposure);
-    ExtraImages extra{images.adc_bgr, images.mosaic, {}, {}};
-    if (output_.radiance) extra.radiance = sensor_.relative(radiance, exposure);
-    if (output_.paired) {
-      cv::Mat unused(radiance.size(), CV_8U, cv::Scalar(0));
-      extra.clean =
-          clean_sensor_.digitise(sharp, exposure, shot.frame, unused, false, &sensor_s).bgr;
-    }
-    {
-      const std::lock_guard lock(mutex_);
-      if (log_) log_->add(shot.frame, shot.exposure);
-    }
-    const ThreadUsage before = thread_usage();
-    writer_.write_frame(shot.frame, images.bgr, truth, extra);
-    const ThreadUsage after = thread_usage();
-    encode_s += after.user_s - before.user_s;
-    write_s += after.system_s - before.system_s;
-  }
-
-  const FrameRenderer& renderer_;
-  const Motion& motion_;
-  const SensorModel &sensor_, &clean_sensor_;
-  const ExposureControl& control_;
-  const OutputSettings& output_;
-  const DatasetWriter& writer_;
-  const PoseTrack& track_;
-  int first_written_;
-  LensSampling sampling_;
-  bool blurs_;  // over the exposure
-  ExposureLog* log_;
-  std::map<int, FrameExposure>* exposures_ = nullptr;
-  std::atomic<bool> stop_ = false;
-  std::mutex mutex_;  // of what follows, the log and the exposures
-  std::condition_variable changed_;
-  std::size_t rendered_ = 0;
-  bool finished_ = false;
-};
-
 }  // namespace
 
 void SimulateOptions::check() const {
@@ -389,9 +192,18 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
         clean_sensor(camera.sensor, faultless(sensing));
     ExposureLog log(out, exposures);
     todo.insert(todo.begin(), metered.begin(), metered.end());
-    FrameLoop loop(renderer, motion, sensor, clean_sensor, control, options.render.output, writer,
-                   path.track, first, lens_sampling(options.render.lens, camera, mount.noise_seed),
-                   options.render.lens.motion_blur, &log);
+    FrameLoop loop({.renderer = renderer,
+                    .motion = motion,
+                    .sensor = sensor,
+                    .clean_sensor = clean_sensor,
+                    .control = control,
+                    .output = options.render.output,
+                    .writer = writer,
+                    .log = log,
+                    .track = path.track,
+                    .sampling = lens_sampling(options.render.lens, camera, mount.noise_seed),
+                    .blurs = options.render.lens.motion_blur,
+                    .first_written = first});
     if (options.render.labels && truth.tracks > 0) {
       loop.track_points = choose_track_points(renderer, motion, frames, truth.tracks, options.seed);
       writer.write_track_points(loop.track_points);

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/portable_math.h"
 #include "scenes/instances.h"
 #include "scenes/lattice_noise.h"
-#include "scenes/portable_math.h"
 
 namespace rugae {
 namespace {

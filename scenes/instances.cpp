@@ -6,10 +6,10 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "core/portable_math.h"
 #include "core/random.h"
 #include "core/units.h"
 #include "scenes/lattice_noise.h"
-#include "scenes/portable_math.h"
 
 namespace rugae {
 namespace {

@@ -6,11 +6,11 @@
 
 #include "core/check.h"
 #include "core/float4.h"
+#include "core/portable_math.h"
 #include "core/random.h"
 #include "scenes/instances.h"
 #include "scenes/lattice_noise.h"
 #include "scenes/noise_tile.h"
-#include "scenes/portable_math.h"
 #include "scenes/region_tint.h"
 #include "scenes/scene.h"
 

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "core/portable_math.h"
 #include "core/units.h"
-#include "scenes/portable_math.h"
 
 namespace rugae {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "core/portable_math.h"
 #include "core/random.h"
 #include "scenes/lattice_noise.h"
-#include "scenes/portable_math.h"
 
 namespace rugae {
 namespace {

@@ -4,18 +4,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "core/check.h"
 #include "core/like.h"
+#include "core/portable_math.h"
 #include "core/random.h"
 #include "core/yaml.h"
-#include "scenes/portable_math.h"
 
 namespace rugae {
 namespace {
 
-// Every section's keys, once: for reading and for writing.
+const std::vector<std::string> kKinds = {"procedural", "mesh"};
+const std::vector<std::string> kWallNormals = {"auto", "outward", "inward"};
+const std::vector<std::string> kOpenEnds = {"cap", "refuse"};
+
+// Every section's keys, once: for reading, writing and listing.
 template <typename Visitor>
 void keys(Visitor& v, ReliefOptions& o) {
   v("rugae_height_mm", o.rugae_height_mm);
@@ -59,6 +64,17 @@ template <typename Visitor>
 void keys(Visitor& v, Shape& o) {
   v("scale", o.of.scale);
   v("variation", o.of.variation);
+}
+
+// Of an imported mesh; where the file lies is read apart.
+template <typename Visitor>
+void keys(Visitor& v, ImportOptions& o) {
+  v("mm_per_unit", o.mm_per_unit);
+  v.choice("wall_normals", kWallNormals, o.wall);
+  v.choice("open_ends", kOpenEnds, o.open_ends);
+  v("component", o.component);
+  v("target_edge_mm", o.target_edge_mm);
+  v("with_relief", o.with_relief);
 }
 
 // FNV-1a (Fowler, Noll, Vo): a number for a path such as "mucosa.wetness".
@@ -106,6 +122,9 @@ struct DrawingReader {
     if (of.has("uniform")) {
       check(pair[0] <= pair[1], "{}: uniform is [{}, {}], expected the least value first",
             of.where("uniform"), pair[0], pair[1]);
+      check(!whole || (pair[0] == std::floor(pair[0]) && pair[1] == std::floor(pair[1])),
+            "{}: uniform is [{}, {}], but {} is a whole number", of.where("uniform"), pair[0],
+            pair[1], key);
       const double u = random_uniform(seed, Purpose::scene_draw, 1, index)[0];
       value = pair[0] + u * (pair[1] - pair[0] + (whole ? 1.0 : 0.0));
       if (whole) value = std::min(std::floor(value), pair[1]);
@@ -128,7 +147,25 @@ struct DrawingReader {
       check(!whole || value == std::floor(value), "{}: {} is {}, expected a whole number",
             of.where("choice"), key, value);
     }
+    constexpr double kMostWhole = std::numeric_limits<int>::max();
+    check(!whole || std::abs(value) <= kMostWhole, "{}: {} is {}, beyond the whole numbers", where,
+          key, value);
     return value;
+  }
+};
+
+// Reads values and nothing else.
+struct PlainReader {
+  YamlReader& yaml;
+  template <typename Value>
+  void operator()(const char* key, Value& value) {
+    yaml.get(key, value);
+  }
+  template <typename Enum>
+  void choice(const char* key, const std::vector<std::string>& names, Enum& value) {
+    int index = static_cast<int>(value);
+    yaml.get_choice(key, names, index);
+    value = static_cast<Enum>(index);
   }
 };
 
@@ -141,6 +178,10 @@ struct Writer {
   void operator()(const char* key, const Number& value) {
     text += fmt::format("{}{}: {}\n", indent, key, value);
   }
+  template <typename Enum>
+  void choice(const char* key, const std::vector<std::string>& names, const Enum& value) {
+    (*this)(key, names[static_cast<std::size_t>(value)]);
+  }
   template <typename Section>
   void section(const char* name, Section section) {
     text += fmt::format("{}:\n", name);
@@ -150,10 +191,25 @@ struct Writer {
   }
 };
 
-std::string quoted(const std::string& text) { return nlohmann::json(text).dump(); }
+struct Lister {
+  std::vector<std::string> list;
+  std::string section;  // with its dot
+  template <typename Value>
+  void operator()(const char* key, Value&) {
+    list.push_back(section + key);
+  }
+  template <typename Enum>
+  void choice(const char* key, const std::vector<std::string>&, Enum&) {
+    list.push_back(section + key);
+  }
+  template <typename Section>
+  void of(const char* name, Section options) {
+    section = *name ? std::string(name) + "." : "";
+    keys(*this, options);
+  }
+};
 
-constexpr const char* kWallNormals[] = {"auto", "outward", "inward"};
-constexpr const char* kOpenEnds[] = {"cap", "refuse"};
+std::string quoted(const std::string& text) { return nlohmann::json(text).dump(); }
 
 template <typename Section>
 void read_section(YamlReader& yaml, const char* name, std::uint64_t seed, Section section) {
@@ -171,15 +227,8 @@ void read_import(YamlReader& yaml, SceneFile& scene, const std::filesystem::path
   else
     yaml.get("mesh", mesh);
   if (!mesh.empty()) scene.mesh = file.parent_path() / mesh;  // an absolute path stays itself
-  yaml.get("mm_per_unit", scene.import.mm_per_unit);
-  int wall = static_cast<int>(scene.import.wall), ends = static_cast<int>(scene.import.open_ends);
-  yaml.get_choice("wall_normals", {std::begin(kWallNormals), std::end(kWallNormals)}, wall);
-  scene.import.wall = static_cast<WallNormals>(wall);
-  yaml.get_choice("open_ends", {std::begin(kOpenEnds), std::end(kOpenEnds)}, ends);
-  scene.import.open_ends = static_cast<OpenEnds>(ends);
-  yaml.get("component", scene.import.component);
-  yaml.get("target_edge_mm", scene.import.target_edge_mm);
-  yaml.get("with_relief", scene.import.with_relief);
+  PlainReader reader{yaml};
+  keys(reader, scene.import);
   scene.import.check(file.string());
 }
 
@@ -187,7 +236,7 @@ void read_import(YamlReader& yaml, SceneFile& scene, const std::filesystem::path
 void read_over(SceneFile& scene, YamlReader& yaml, const std::filesystem::path& file,
                std::uint64_t seed) {
   int kind = static_cast<int>(scene.kind);
-  yaml.get_choice("kind", {"procedural", "mesh"}, kind);
+  yaml.get_choice("kind", kKinds, kind);
   scene.kind = static_cast<SceneKind>(kind);
   if (scene.kind == SceneKind::mesh) {
     read_import(yaml, scene, file);
@@ -222,17 +271,27 @@ SceneFile read_scene_file(const std::filesystem::path& file, std::uint64_t seed)
   return scene;
 }
 
+std::vector<std::string> list_scene_keys() {
+  Lister lister{{"like", "kind", "mesh"}, ""};
+  SceneFile any;
+  lister.of<ImportOptions&>("", any.import);
+  lister.of("", Shape{any.stomach});
+  lister.of<ReliefOptions&>("relief", any.stomach.relief);
+  lister.of<MucosaOptions&>("mucosa", any.mucosa);
+  lister.of("lesions", Lesions{any.stomach.instances});
+  lister.of("objects", Objects{any.stomach.instances});
+  for (const Field& field : list_deformation()) lister.list.push_back("deformation." + field.path);
+  return std::move(lister.list);
+}
+
 std::string resolved_yaml(const SceneFile& scene) {
   SceneFile all = scene;
   Writer writer;
   if (scene.kind == SceneKind::mesh) {
-    const ImportOptions& o = scene.import;
     writer.text = fmt::format(
-        "kind: mesh\nmesh: {}\nmm_per_unit: {}\nwall_normals: {}\nopen_ends: {}\ncomponent: {}\n"
-        "target_edge_mm: {}\nwith_relief: {}\n",
-        quoted(std::filesystem::absolute(scene.mesh).lexically_normal().generic_string()),
-        o.mm_per_unit, kWallNormals[static_cast<int>(o.wall)],
-        kOpenEnds[static_cast<int>(o.open_ends)], o.component, o.target_edge_mm, o.with_relief);
+        "kind: mesh\nmesh: {}\n",
+        quoted(std::filesystem::absolute(scene.mesh).lexically_normal().generic_string()));
+    keys(writer, all.import);
   } else {
     writer.text = "kind: procedural\n";
     Shape shape{all.stomach};

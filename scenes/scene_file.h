@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "scenes/deformation.h"
 #include "scenes/import.h"
@@ -30,6 +31,9 @@ struct SceneFile {
 /// It is drawn by (seed, the key's path), so that no draw depends on what else the file holds.
 /// Throws Error with file, line and column.
 SceneFile read_scene_file(const std::filesystem::path& file, std::uint64_t seed);
+
+/// The path of every key that a scene file may hold, such as "mucosa.wetness".
+std::vector<std::string> list_scene_keys();
 
 /// A file that holds every default and every draw, and builds on no other scene file: with the same
 /// seed it gives the same scene. A mesh is named by its absolute path.

@@ -7,9 +7,9 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "core/portable_math.h"
 #include "core/random.h"
 #include "scenes/isosurface.h"
-#include "scenes/portable_math.h"
 #include "scenes/subdivide.h"
 
 namespace rugae {

@@ -14,10 +14,10 @@ cmake -S . -B "$tree" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=c
 cmake --build "$tree" --target same_bytes
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-for trajectory in 1 6; do
-  "$ours" "$trajectory" "$work/ours"
-  "$tree/tests/same_bytes" "$trajectory" "$work/theirs"
-  diff "$work/ours/manifest.sha256" "$work/theirs/manifest.sha256" || { echo "trajectory $trajectory: different bytes"; exit 1; }
+for name in loops oil fisheye imported; do
+  "$ours" "$name" "$work/ours"
+  "$tree/tests/same_bytes" "$name" "$work/theirs"
+  diff "$work/ours/manifest.sha256" "$work/theirs/manifest.sha256" || { echo "$name: different bytes"; exit 1; }
   rm -rf "$work/ours" "$work/theirs"
 done
 echo "same bytes"

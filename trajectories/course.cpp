@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/portable_math.h"
 #include "core/random.h"
 #include "trajectories/channels.h"
 #include "trajectories/spline.h"
@@ -31,9 +32,13 @@ constexpr double kOutAndBack = 0.6;
 // Values of the random splines a cycle.
 constexpr double kValuesPerCycle = 2.0;
 
+double sine(double angle_rad) { return portable_sin_cos(angle_rad).sine; }
+double cosine(double angle_rad) { return portable_sin_cos(angle_rad).cosine; }
+double arcsine(double x) { return portable_atan2(x, std::sqrt((1.0 - x) * (1.0 + x))); }
+
 /// A triangle wave with rounded corners: 0 at even v, 1 at odd v; a sharpness of 1 has corners.
 double to_and_fro(double v, double sharpness) {
-  return 0.5 - 0.5 * std::asin(sharpness * std::cos(kPi * v)) / std::asin(sharpness);
+  return 0.5 - 0.5 * arcsine(sharpness * cosine(kPi * v)) / arcsine(sharpness);
 }
 constexpr double kSharpnessAlong = 0.9;
 constexpr double kSharpnessRetracing = 0.99;
@@ -41,7 +46,7 @@ constexpr double kSharpnessRetracing = 0.99;
 /// A square wave with rounded edges: near 1 between 0 and 1, near -1 between 1 and 2.
 double out_or_back(double v) {
   constexpr double kRounding = 0.3;
-  const double s = std::sin(kPi * v);
+  const double s = sine(kPi * v);
   return s / std::sqrt(s * s + kRounding * kRounding);
 }
 
@@ -78,7 +83,7 @@ Course::Place Course::place(const CourseSize& size, double tau) const {
   if (size.loops > 0) {
     const double stations = double(size.loops) / options_.loops.per_station;
     const double x = tau * stations;
-    progress = (x - kLinger * std::sin(2.0 * kPi * x) / (2.0 * kPi)) / stations;
+    progress = (x - kLinger * sine(2.0 * kPi * x) / (2.0 * kPi)) / stations;
   }
   const double way = options_.retrace ? to_and_fro(2.0 * progress, kSharpnessRetracing) : progress;
   const double v = size.passes * (options_.retrace ? 0.5 : 1.0) * way;
@@ -91,8 +96,7 @@ Course::Place Course::place(const CourseSize& size, double tau) const {
   at.along_mm = 0.5 * tube_.length_mm() + (share - 0.5) * length;
   // Without loops the direction turns between the ends and hardly at them, where the path turns.
   const double turned =
-      size.loops > 0 ? way
-                     : way - kSteadyEnds * std::sin(2.0 * kPi * v) / (2.0 * kPi * size.passes);
+      size.loops > 0 ? way : way - kSteadyEnds * sine(2.0 * kPi * v) / (2.0 * kPi * size.passes);
   at.around_rad = start_rad_ + hand_ * 2.0 * kPi * options_.winding_turns * size.reach * turned;
 
   at.offset_share = options_.offset_share * (1.0 + kOutAndBack * out_or_back(v));
@@ -101,18 +105,18 @@ Course::Place Course::place(const CourseSize& size, double tau) const {
     const double a = size.loop_mm * (1.0 + kLoopSizeSpread * noise(loop_size_, tau));
     switch (options_.loops.shape) {
       case LoopShape::circle:
-        at.shift_along_mm = a * std::sin(psi);
-        at.shift_around_mm = a * std::cos(psi);
+        at.shift_along_mm = a * sine(psi);
+        at.shift_around_mm = a * cosine(psi);
         break;
       case LoopShape::eight:
-        at.shift_along_mm = a * std::sin(psi);
-        at.shift_around_mm = 0.8 * a * std::sin(2.0 * psi + phases_[0]);
-        at.shift_away_mm = 0.4 * a * std::cos(psi + phases_[1]);
+        at.shift_along_mm = a * sine(psi);
+        at.shift_around_mm = 0.8 * a * sine(2.0 * psi + phases_[0]);
+        at.shift_away_mm = 0.4 * a * cosine(psi + phases_[1]);
         break;
       case LoopShape::knot:
-        at.shift_along_mm = a * (0.8 * std::sin(psi) + 0.4 * std::sin(3.0 * psi + phases_[0]));
-        at.shift_around_mm = a * (0.8 * std::cos(psi) + 0.4 * std::sin(2.0 * psi + phases_[1]));
-        at.shift_away_mm = 0.5 * a * std::sin(2.0 * psi + phases_[2]);
+        at.shift_along_mm = a * (0.8 * sine(psi) + 0.4 * sine(3.0 * psi + phases_[0]));
+        at.shift_around_mm = a * (0.8 * cosine(psi) + 0.4 * sine(2.0 * psi + phases_[1]));
+        at.shift_away_mm = 0.5 * a * sine(2.0 * psi + phases_[2]);
         break;
     }
   }
@@ -121,7 +125,7 @@ Course::Place Course::place(const CourseSize& size, double tau) const {
 
 Vec3 Course::point(const Place& at) const {
   const double along = std::clamp(at.along_mm + at.shift_along_mm, 0.0, tube_.length_mm());
-  const Vec2 outward(std::cos(at.around_rad), std::sin(at.around_rad));
+  const Vec2 outward(cosine(at.around_rad), sine(at.around_rad));
   const Vec2 around(-outward.y(), outward.x());
   const double offset =
       at.offset_share * tube_.extent_mm(at.along_mm, at.around_rad) + at.shift_away_mm;
@@ -137,13 +141,13 @@ Rigid3 Course::world_from_camera(const CourseSize& size, double tau) const {
                         kFixation * at.shift_around_mm / kPatchDistanceMm;
   const double wanted = view.tilt_rad + kSwayAlong * view.sway_rad * noise(sway_along_, tau) -
                         kFixation * at.shift_along_mm / kPatchDistanceMm;
-  const double along = kMostAlongRad * std::tanh(wanted / kMostAlongRad);
+  const double along = kMostAlongRad * portable_tanh(wanted / kMostAlongRad);
   // The camera's axes in the tube's frame: z looks to the side and by `along` towards the far end;
   // the picture's up (-y) is the way to the far end, so that places seen again are seen upright
   // again.
-  const double c = std::cos(along), s = std::sin(along);
-  const Vec3 z(c * std::cos(around), c * std::sin(around), s);
-  const Vec3 down(s * std::cos(around), s * std::sin(around), -c);
+  const double c = cosine(along), s = sine(along);
+  const Vec3 z(c * cosine(around), c * sine(around), s);
+  const Vec3 down(s * cosine(around), s * sine(around), -c);
   Mat3 tube_from_camera;
   tube_from_camera << down.cross(z), down, z;
   const Quat rotation = tube_.frame(at.along_mm) * Quat(tube_from_camera);

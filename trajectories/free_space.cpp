@@ -8,6 +8,8 @@
 #include <limits>
 #include <queue>
 
+#include "core/portable_math.h"
+
 namespace rugae {
 namespace {
 
@@ -82,7 +84,7 @@ int largest_part(const Vec3i& size, const std::vector<double>& inside) {
 
 FreeSpace::FreeSpace(const TriangleMesh& wall) : wall_(wall) {
   const Eigen::AlignedBox3d box = bounding_box(wall);
-  step_mm_ = std::cbrt(box.volume() / kGridPoints);
+  step_mm_ = portable_cbrt(box.volume() / kGridPoints);
   origin_ = box.min();
   size_ = (box.sizes() / step_mm_).array().ceil().cast<int>() + 1;
   depth_mm_.resize(static_cast<std::size_t>(size_.prod()));

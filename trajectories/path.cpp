@@ -42,7 +42,8 @@ double PlannedPath::length_mm() const { return impl_->length_mm; }
 double PlannedPath::min_clearance_mm() const { return impl_->min_clearance_mm; }
 
 Rigid3 sampled_pose(const PlannedPath& path, double fraction) {
-  // The last bits of a mathematics library's sines differ between processors; rounded poses do not.
+  // Planning is the same to the last bit everywhere (core/portable_math.h); what lies below the
+  // rounding is the error of its iterations.
   const auto rounded = [](double value, int bits) {
     return std::ldexp(std::nearbyint(std::ldexp(value, bits)), -bits);
   };

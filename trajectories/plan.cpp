@@ -33,8 +33,9 @@ double tau_of(int k, int count) { return (k - 1.0) / (count - 3.0); }
 Travel picture_motion(const PlannedPath::Impl& impl) {
   return {static_cast<int>(impl.positions.size()) - 3,
           [positions = impl.positions, rotations = impl.rotations](double u) {
-            return std::hypot(spline_slope(positions, u).norm(),
-                              kWallDistanceMm * spline_turn_rate(rotations, u).norm());
+            return Vec2(spline_slope(positions, u).norm(),
+                        kWallDistanceMm * spline_turn_rate(rotations, u).norm())
+                .norm();
           }};
 }
 

@@ -1,6 +1,7 @@
 #include "trajectories/spline.h"
 
 #include "core/check.h"
+#include "core/portable_math.h"
 
 namespace rugae {
 namespace {
@@ -23,9 +24,9 @@ Quat power(const Quat& q_any, double weight) {
   const Quat q = same_side(Quat::Identity(), q_any);
   const double sine = q.vec().norm();
   if (sine < 1e-12) return {1.0, weight * q.x(), weight * q.y(), weight * q.z()};
-  const double half_angle = weight * std::atan2(sine, q.w());
-  const Vec3 v = q.vec() * (std::sin(half_angle) / sine);
-  return {std::cos(half_angle), v.x(), v.y(), v.z()};
+  const SineCosine half = portable_sin_cos(weight * portable_atan2(sine, q.w()));
+  const Vec3 v = q.vec() * (half.sine / sine);
+  return {half.cosine, v.x(), v.y(), v.z()};
 }
 
 }  // namespace
@@ -81,7 +82,7 @@ std::vector<Quat> interpolating_controls(const std::vector<Quat>& rotations) {
     for (int k = 0; k < n; ++k) {
       const Quat now = spline_rotation(control, k);
       miss[k] = now.conjugate() * rotations[k];
-      worst = std::max(worst, now.angularDistance(rotations[k]));
+      worst = std::max(worst, 2.0 * miss[k].vec().norm());  // the angle, where it is small
     }
     if (worst <= kToleranceRad) break;
     for (int k = 0; k < n; ++k) control[k + 1] = (control[k + 1] * miss[k]).normalized();
@@ -102,7 +103,7 @@ Vec3 spline_turn_rate(const std::vector<Quat>& control, double u) {
   for (int j = 0; j < 3; ++j) {
     const Quat step = same_side(Quat::Identity(), control[i + j].conjugate() * control[i + j + 1]);
     const double sine = step.vec().norm();
-    const double angle_over_sine = sine < 1e-12 ? 2.0 : 2.0 * std::atan2(sine, step.w()) / sine;
+    const double angle_over_sine = sine < 1e-12 ? 2.0 : 2.0 * portable_atan2(sine, step.w()) / sine;
     rate = power(step, cumulative[j]).conjugate() * rate + rates[j] * angle_over_sine * step.vec();
   }
   return rate;

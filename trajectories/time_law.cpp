@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/portable_math.h"
 #include "core/random.h"
 #include "trajectories/channels.h"
 
@@ -27,7 +28,7 @@ double TimeLaw::share(double fraction) const {
   double bumps = 0.0;
   for (const double center : centers_) {
     const double x = std::clamp(fraction - center, -width_, width_);
-    bumps += 0.5 * (x + width_) + width_ / (2.0 * kPi) * std::sin(kPi * x / width_);
+    bumps += 0.5 * (x + width_) + width_ / (2.0 * kPi) * portable_sin_cos(kPi * x / width_).sine;
   }
   return std::clamp(base_ * fraction + (peak_ - base_) * bumps, 0.0, 1.0);
 }

@@ -82,8 +82,8 @@ class PlannedPath {
 PlannedPath plan_path(const TriangleMesh& wall, const TrajectoryOptions& options,
                       std::uint64_t seed);
 
-/// The pose at `fraction` (held at the ends beyond [0, 1]), rounded to 1e-9 mm and 1e-12 so that it
-/// does not depend on the last bits of the mathematics library.
+/// The pose at `fraction` (held at the ends beyond [0, 1]), rounded to 1e-9 mm and 1e-12, below
+/// which planning means nothing.
 Rigid3 sampled_pose(const PlannedPath& path, double fraction);
 
 /// `frames` poses at equal steps of time over the whole path, the first at its start and the last

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/portable_math.h"
 #include "core/units.h"
 #include "trajectories/spline.h"
 
@@ -87,7 +88,8 @@ Tube::Tube(const FreeSpace& space, const std::vector<Vec3>& axis, double keep_mm
     const Vec3 bend = (tangents[b] - tangents[a]) / (std::max(b - a, 1) * step_mm);
     for (int k = 0; k < kAzimuths; ++k) {
       const double angle = 2.0 * kPi * k / kAzimuths;
-      const Vec3 ray = frames_[i] * Vec3(std::cos(angle), std::sin(angle), 0.0);
+      const SineCosine azimuth = portable_sin_cos(angle);
+      const Vec3 ray = frames_[i] * Vec3(azimuth.cosine, azimuth.sine, 0.0);
       double extent = free_distance(space, points[i], ray, keep_mm);
       const double inward = bend.dot(ray);
       if (inward > 0.0) extent = std::min(extent, kMostOfBendRadius / inward);
@@ -136,10 +138,10 @@ Vec3 Tube::point(double along_mm, const Vec2& beside_mm) const {
   const double r = beside_mm.norm();
   if (!(r > 0.0)) return on_axis;
   // r' = r / (1 + (r/R)^4)^(1/4) < R, and r' = r to fourth order near the axis.
-  const double extent = extent_mm(along_mm, std::atan2(beside_mm.y(), beside_mm.x()));
+  const double extent = extent_mm(along_mm, portable_atan2(beside_mm.y(), beside_mm.x()));
   if (!(extent > 0.0)) return on_axis;
   const double ratio = r / extent;
-  const double drawn = 1.0 / std::pow(1.0 + ratio * ratio * ratio * ratio, 0.25);
+  const double drawn = 1.0 / std::sqrt(std::sqrt(1.0 + ratio * ratio * ratio * ratio));
   const Vec2 inside = drawn * beside_mm;
   return on_axis + frame(along_mm) * Vec3(inside.x(), inside.y(), 0.0);
 }

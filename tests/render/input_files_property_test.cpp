@@ -1,77 +1,23 @@
-// Camera, scene and trajectory files: sound ones are read and render, broken ones are refused with
-// the file named. The mistakes are made in what the writers write and in the presets, so that new
-// keys are covered.
+// Camera and trajectory files: sound ones are read and render, broken ones are refused with the
+// file named. The mistakes are made in what the writers write and in the presets, so that new keys
+// are covered.
 
-#include <gtest/gtest.h>
-#include <unistd.h>
-
-#include <filesystem>
-#include <opencv2/core.hpp>
-
-#include "core/files.h"
-#include "core/presets.h"
-#include "render/frame.h"
-#include "scenes/scene_file.h"
-#include "tests/properties.h"
+#include "tests/render/input_files.h"
 #include "tests/render/walls.h"
 #include "trajectories/trajectory.h"
 
 namespace rugae {
 namespace {
 
-namespace fs = std::filesystem;
+using test::check_frame;
 using test::flip;
+using test::InputFiles;
 using test::one_of;
 using test::real;
+using test::some_of;
 using test::text_of;
 using test::whole;
 using Kind = Field::Kind;
-
-// A file that is written anew for every case.
-class InputFiles : public testing::Test {
- protected:
-  void SetUp() override { make_folder(root_); }
-  void TearDown() override { fs::remove_all(root_); }
-  std::string file(const std::string& text) const {
-    const fs::path path = root_ / "given.yaml";
-    write_atomic(path, text);
-    return path.string();
-  }
-  // Every text with one mistake is refused, and junk does no harm.
-  void expect_mistakes_refused(const std::vector<std::string>& sound,
-                               const std::function<void(const std::string&)>& read) const {
-    test::for_cases(300, [&] {
-      const std::string text = test::Breaker(one_of(sound)).broken();
-      std::string message;
-      const std::string given = file(text);
-      const bool refused = test::refuses([&] { read(given); }, "given.yaml", message);
-      RC_LOG(text);
-      RC_LOG(message);
-      RC_ASSERT(refused);
-    });
-    test::for_cases(300, [&] {
-      const std::string text = test::junk(one_of(sound));
-      std::string message;
-      const std::string given = file(text);
-      const bool refused = test::refuses([&] { read(given); }, "given.yaml", message);
-      RC_LOG(text.substr(0, 200));
-      RC_LOG(message);
-      RC_ASSERT(refused || message == "accepted");
-    });
-  }
-  static std::vector<std::string> presets(const std::string& kind) {
-    std::vector<std::string> texts;
-    for (const std::string& name : preset_names(kind))
-      texts.push_back(read_text(find_preset(kind, kind, name)));
-    return texts;
-  }
-
-  fs::path root_ = fs::temp_directory_path() / fmt::format("rugae_inputs_{}", getpid());
-};
-
-std::string some_of(const std::vector<Field>& fields) {
-  return test::mapping_of(fields, [](const Field& f) { return flip() ? test::value_of(f) : ""; });
-}
 
 // A small camera whose distortion has an inverse up to the corners.
 std::string random_camera() {
@@ -120,23 +66,6 @@ std::string random_camera() {
     text += "]";
   }
   return text + "}\n";
-}
-
-void check_frame(const CleanFrame& frame) {
-  RC_ASSERT(cv::checkRange(frame.radiance, true, nullptr, 0.0, 1e30));
-  const FrameTruth& truth = frame.truth;
-  for (int y = 0; y < truth.masks.rows; ++y)
-    for (int x = 0; x < truth.masks.cols; ++x) {
-      const bool valid = truth.masks.at<unsigned char>(y, x) & kMaskValid;
-      const float depth = truth.depth_mm.at<float>(y, x);
-      RC_ASSERT(valid == std::isfinite(depth));
-      RC_ASSERT(!valid || depth > 0.0f);
-      const auto n = truth.normal.at<Vec3f>(y, x);
-      RC_ASSERT(!valid || std::abs(n.norm() - 1.0f) < 1e-5f);
-      RC_ASSERT(valid || frame.radiance.at<Vec3f>(y, x).isZero(0.0f));
-      const bool flows = truth.masks.at<unsigned char>(y, x) & kMaskFlowValid;
-      RC_ASSERT(flows == truth.flow_px.at<Vec2f>(y, x).allFinite());
-    }
 }
 
 TEST_F(InputFiles, SoundCamerasRender) {
@@ -198,73 +127,6 @@ TEST_F(InputFiles, BrokenTrajectoriesAreRefused) {
     return f.kind == Kind::word ? f.words[0] : f.kind == Kind::flag ? "true" : text_of(f.low);
   }));
   expect_mistakes_refused(sound, [](const std::string& path) { load_trajectory(path); });
-}
-
-const std::vector<Field> kScene = {
-    {"scale", Kind::real, 0.3, 2.0, {}},
-    {"variation", Kind::real, 0.0, 1.0, {}},
-    {"lesions.polyp", Kind::whole, 0, 30, {}},
-    {"lesions.ulcer", Kind::whole, 0, 30, {}},
-    {"lesions.erosion", Kind::whole, 0, 30, {}},
-    {"lesions.bleeding", Kind::whole, 0, 30, {}},
-    {"lesions.angiectasia", Kind::whole, 0, 30, {}},
-    {"objects.debris", Kind::whole, 0, 30, {}},
-    {"objects.bubbles", Kind::whole, 0, 30, {}},
-    {"mucosa.vessel_contrast", Kind::real, 0.0, 1.0, {}},
-    {"mucosa.mottle_contrast", Kind::real, 0.0, 1.0, {}},
-    {"mucosa.wetness", Kind::real, 0.0, 1.0, {}},
-    {"mucosa.oil", Kind::real, 0.0, 1.0, {}},
-};
-
-std::string random_scene() {
-  std::string text = some_of(kScene);
-  text.pop_back();
-  text += text.size() > 1 && text.find(':') != std::string::npos && text.back() != ' ' ? ", " : "";
-  if (flip()) {
-    // waves far enough apart for their width
-    text += "deformation: " + test::mapping_of(list_deformation(), [](const Field& f) {
-              if (f.path == "width_mm" || f.path == "speed_mm_s" || f.path == "waves_per_minute")
-                return std::string();
-              return flip() ? test::value_of(f) : std::string();
-            });
-  }
-  return text + "}\n";
-}
-
-TEST_F(InputFiles, SoundScenesAreReadAndWritten) {
-  test::for_cases(200, [&] {
-    const std::string text = random_scene();
-    RC_LOG(text);
-    const std::string written = resolved_yaml(read_scene_file(file(text), 3));
-    RC_ASSERT(resolved_yaml(read_scene_file(file(written), 3)) == written);
-  });
-}
-
-TEST_F(InputFiles, SoundScenesRender) {
-  const Camera camera = test::small_camera(32, 24);
-  test::for_cases(2, [&] {
-    const std::string text = random_scene();
-    RC_LOG(text);
-    const Scene scene =
-        load_scene({.name_or_path = file(text), .seed = 2, .resolution = "coarse", .oil = 0.0});
-    Vec3 inside = Vec3::Zero();
-    int count = 0;
-    for (std::size_t v = 0; v < scene.wall.vertices.size(); ++v)
-      if (scene.regions[v] == Region::body) {
-        inside += scene.wall.vertices[v];
-        ++count;
-      }
-    const Rigid3 pose(test::random_rotation(4), inside / count);
-    const Rigid3 next(pose.rotation, pose.translation + Vec3(0.3, 0.2, 0.1));
-    check_frame(FrameRenderer(scene, camera, {}).render(pose, &next));
-  });
-}
-
-TEST_F(InputFiles, BrokenScenesAreRefused) {
-  std::vector<std::string> sound = presets("scenes");
-  for (const std::string& name : preset_names("scenes"))
-    sound.push_back(resolved_yaml(read_scene_file(find_preset("scenes", "scene", name), 1)));
-  expect_mistakes_refused(sound, [](const std::string& path) { read_scene_file(path, 1); });
 }
 
 }  // namespace

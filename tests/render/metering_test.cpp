@@ -9,7 +9,7 @@
 namespace rugae {
 namespace {
 
-constexpr double kPortablePower = 1e-6;  // relative; exp and log of scenes/portable_math.h
+constexpr double kPortablePower = 1e-6;  // relative; exp and log of core/portable_math.h
 
 const Sensor kSensor{6.0, 30.0, 10, 18000.0, 10.0};
 

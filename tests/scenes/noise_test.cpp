@@ -4,23 +4,9 @@
 
 #include "scenes/lattice_noise.h"
 #include "scenes/noise_tile.h"
-#include "scenes/portable_math.h"
 
 namespace rugae {
 namespace {
-
-TEST(PortableMath, AgreesWithTheLibrary) {
-  constexpr double kStated = 1e-6;  // the largest error the header states
-  for (double x = -40.0; x <= 0.0; x += 0.0137)
-    EXPECT_TRUE(std::abs(portable_exp(x) / std::exp(x) - 1.0) <= 1e-8) << x;
-  for (double x = 1e-6; x < 1e6; x *= 1.0137)
-    EXPECT_TRUE(std::abs(portable_log(x) - std::log(x)) <= 1e-8) << x;
-  for (double turns = -3.0; turns < 3.0; turns += 0.00137) {
-    const SineCosine sc = portable_turn(turns);
-    EXPECT_TRUE(std::abs(sc.sine - std::sin(2.0 * M_PI * turns)) <= kStated) << turns;
-    EXPECT_TRUE(std::abs(sc.cosine - std::cos(2.0 * M_PI * turns)) <= kStated) << turns;
-  }
-}
 
 TEST(LatticeNoise, GradientIsTheDerivative) {
   constexpr double kStep = 1e-5, kTolerance = 1e-6;  // central difference: error of order step^2

@@ -1,8 +1,10 @@
 #pragma once
-// Elementary functions from additions, multiplications and exact bit operations only. The C library
-// may pick another variant of exp or log for another processor, and its last digit would change the
-// wall; these give the same bits on every x86-64.
+// Elementary functions from + - * / sqrt and exact bit operations only. The C library may pick
+// another variant of exp, log or sin for another processor, and its last digit would change the
+// frames; these give the same bits on every x86-64. The short ones are for what is asked millions
+// of times, and their bits are part of every wall; the others are as exact as doubles.
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -35,10 +37,30 @@ inline double portable_log(double x) {
   return 2.0 * z * sum + (e + 0.5) * kLn2;
 }
 
-/// Sine and cosine of a full turn times `turns`, absolute error below 1e-6.
+/// base^exponent for normal 0 < base <= 1 and exponent >= 0, relative error below
+/// 1e-8 (1 + exponent).
+inline double portable_power(double base, double exponent) {
+  return portable_exp(std::min(0.0, exponent * portable_log(base)));
+}
+
 struct SineCosine {
   double sine, cosine;
+  /// Of the angle `quarters` right angles farther.
+  SineCosine turned(std::int64_t quarters) const {
+    switch (quarters & 3) {
+      case 0:
+        return {sine, cosine};
+      case 1:
+        return {cosine, -sine};
+      case 2:
+        return {-sine, -cosine};
+      default:
+        return {-cosine, sine};
+    }
+  }
 };
+
+/// Sine and cosine of a full turn times `turns`, absolute error below 1e-6.
 inline SineCosine portable_turn(double turns) {
   // a = the angle to the nearest quarter turn, at most pi/4; Taylor polynomials there
   const double quarters = std::floor(4.0 * turns + 0.5);
@@ -46,17 +68,21 @@ inline SineCosine portable_turn(double turns) {
   const double s = a * (1.0 + aa * (-1.0 / 6.0 + aa * (1.0 / 120.0 + aa * (-1.0 / 5040.0))));
   const double c =
       1.0 + aa * (-0.5 + aa * (1.0 / 24.0 + aa * (-1.0 / 720.0 + aa * (1.0 / 40320.0))));
-  switch (static_cast<std::int64_t>(quarters) & 3) {
-    case 0:
-      return {s, c};
-    case 1:
-      return {c, -s};
-    case 2:
-      return {-s, -c};
-    default:
-      return {-c, s};
-  }
+  return SineCosine{s, c}.turned(static_cast<std::int64_t>(quarters));
 }
+
+/// Sine and cosine of an angle of at most 1e6 rad, absolute error below 2e-16; NaN beyond.
+SineCosine portable_sin_cos(double angle_rad);
+
+/// Angle of the vector (x, y) from the x axis in (-pi, pi], relative error below 1e-15; 0 for the
+/// vector (0, 0), NaN if either is or both are infinite.
+double portable_atan2(double y, double x);
+
+/// Hyperbolic tangent, relative error below 1e-15.
+double portable_tanh(double x);
+
+/// Cube root of a normal x > 0, relative error below 1e-15.
+double portable_cbrt(double x);
 
 /// 0 below `from`, 1 above `to`, 3 t^2 - 2 t^3 between; `from` may be above `to`.
 template <typename T>
