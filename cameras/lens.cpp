@@ -104,6 +104,9 @@ double kannala_brandt_slope(const Lens& lens, double theta) {
 // Newton's method from a start inside the monotonic region; the step is halved while it leaves the
 // region or makes the residual grow, so that the wanted root is the one found.
 std::optional<Vec2> undistort(const Lens& lens, double limit, const Vec2& target) {
+  const bool distorts =
+      lens.k1 != 0.0 || lens.k2 != 0.0 || lens.k3 != 0.0 || lens.p1 != 0.0 || lens.p2 != 0.0;
+  if (!distorts) return target.norm() <= limit ? std::optional(target) : std::nullopt;
   Vec2 n = target;
   // The radial part alone gives a start inside the region for any strength of barrel or pincushion.
   const double r_target = target.norm();
