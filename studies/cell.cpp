@@ -1,5 +1,7 @@
 #include "studies/cell.h"
 
+#include <functional>
+
 #include "core/check.h"
 #include "core/files.h"
 #include "core/like.h"
@@ -89,13 +91,12 @@ json make_dataset(SimulateOptions options, const Cell& cell, const fs::path& dat
 }
 
 // The reason when the method gave up on these frames: a result of the study like any other.
-std::optional<std::string> make_estimate(const ReconOptions& options, const fs::path& dataset,
+std::optional<std::string> make_estimate(const std::function<void()>& method,
                                          const fs::path& estimate, Progress& progress) {
   if (fs::exists(EstimateLayout{estimate}.info())) return std::nullopt;
   fs::remove_all(estimate);  // what a killed run left: reconstruction has no middle to go on from
-  const Observations observations = Observations::open(dataset);
   try {
-    reconstruct(observations, options, estimate, progress);
+    method();
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
@@ -103,6 +104,13 @@ std::optional<std::string> make_estimate(const ReconOptions& options, const fs::
     return error.what();
   }
   return std::nullopt;
+}
+
+// What a program's estimate is a function of: its arguments, and its text where it is a file.
+json command_key(const ExternalMethod& method) {
+  const std::string& program = method.command[0];
+  return {{"command", method.command},
+          {"program", fs::is_regular_file(program) ? sha256_of_file(program) : std::string()}};
 }
 
 json metrics_of_failure(const std::string& reason, const json& simulation) {
@@ -154,7 +162,10 @@ CellResult run_cell(const StudyOptions& study, const Cell& cell, const fs::path&
   recon.seed = cell.seed;
   const json data_key = dataset_key(variant.simulate, cell);
   const std::string data_hash = short_hash(data_key);
-  const std::string hash = short_hash({{"dataset", data_key}, {"recon", to_json_text(recon)}});
+  const ExternalMethod* const command = study.command_of(cell.method);
+  const std::string hash =
+      short_hash(command ? json{{"dataset", data_key}, {"command", command_key(*command)}}
+                         : json{{"dataset", data_key}, {"recon", to_json_text(recon)}});
 
   CellResult result;
   result.cell = cell;
@@ -168,10 +179,17 @@ CellResult run_cell(const StudyOptions& study, const Cell& cell, const fs::path&
     return result;
   }
   const json simulation = make_dataset(variant.simulate, cell, result.dataset, progress);
-  const auto gave_up = make_estimate(recon, result.dataset, result.estimate, progress);
+  const auto method = [&] {
+    if (command)
+      reconstruct_by(*command, result.dataset, result.estimate, progress);
+    else
+      reconstruct(Observations::open(result.dataset), recon, result.estimate, progress);
+  };
+  const auto gave_up = make_estimate(method, result.estimate, progress);
   result.metrics = gave_up ? metrics_of_failure(*gave_up, simulation)
                            : evaluate(result.dataset, result.estimate, progress);
   result.metrics["simulation"] = simulation;
+  if (gave_up && command) return result;  // a program may be mended: it is tried again next time
   write_atomic(metrics, result.metrics.dump(1) + "\n");
   return result;
 }

@@ -127,7 +127,57 @@ void read_seeds(YamlReader& yaml, std::vector<std::uint64_t>& seeds) {
           seed);
 }
 
+// A program given by a path is looked for beside the study file, then under the presets' root.
+std::vector<ExternalMethod> read_commands(YamlReader& study, const std::string& study_file) {
+  std::vector<ExternalMethod> commands;
+  auto yaml = study.child("commands");
+  if (!yaml) return commands;
+  for (const std::string& name : yaml->keys()) {
+    ExternalMethod method{name, {}};
+    yaml->get(name, method.command);
+    method.check(yaml->where(name));
+    std::string& program = method.command[0];
+    if (program.find('/') != std::string::npos)
+      for (const std::filesystem::path& folder :
+           {std::filesystem::path(study_file).parent_path(), preset_root()}) {
+        const auto beside = std::filesystem::absolute(folder / program);
+        if (!std::filesystem::exists(beside)) continue;
+        program = beside.lexically_normal().string();
+        break;
+      }
+    commands.push_back(std::move(method));
+  }
+  return commands;
+}
+
+void read_methods(YamlReader& yaml, const ReconOptions& recon, StudyOptions& study) {
+  study.methods = {recon.method};
+  yaml.get("methods", study.methods);
+  check(!study.methods.empty(), "{}: methods is empty, expected at least one",
+        yaml.where("methods"));
+  for (const std::string& method : study.methods) {
+    if (study.command_of(method)) continue;
+    ReconOptions options = recon;
+    options.method = method;
+    try {
+      options.check();
+    } catch (const Error& error) {
+      fail("{}: {}{}", yaml.where("methods"), error.what(),
+           study.commands.empty() ? "" : ", or a name of commands");
+    }
+  }
+  for (const ExternalMethod& command : study.commands)
+    check(std::ranges::count(study.methods, command.name) > 0,
+          "{}: '{}' is not among the methods: {}", yaml.where("commands"), command.name,
+          fmt::join(study.methods, ", "));
+}
+
 }  // namespace
+
+const ExternalMethod* StudyOptions::command_of(const std::string& method) const {
+  const auto at = std::ranges::find(commands, method, &ExternalMethod::name);
+  return at == commands.end() ? nullptr : &*at;
+}
 
 StudyOptions read_study_text(const std::string& text, const std::string& name) {
   YamlReader yaml = YamlReader::from_text(text, name);
@@ -137,19 +187,8 @@ StudyOptions read_study_text(const std::string& text, const std::string& name) {
   read_names(yaml, "cameras", "camera", study.cameras);
   read_names(yaml, "trajectories", "trajectory", study.trajectories);
   read_seeds(yaml, study.seeds);
-  study.methods = {base.recon.method};
-  yaml.get("methods", study.methods);
-  check(!study.methods.empty(), "{}: methods is empty, expected at least one",
-        yaml.where("methods"));
-  for (const std::string& method : study.methods) {
-    ReconOptions options = base.recon;
-    options.method = method;
-    try {
-      options.check();
-    } catch (const Error& error) {
-      fail("{}: {}", yaml.where("methods"), error.what());
-    }
-  }
+  study.commands = read_commands(yaml, name);
+  read_methods(yaml, base.recon, study);
   const std::vector<Axis> axes = read_axes(yaml);
   for (YamlReader& gate : yaml.children("gates")) study.gates.push_back(read_gate(gate, axes));
   yaml.finish();

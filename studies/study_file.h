@@ -9,6 +9,7 @@
 #include "recon/options.h"
 #include "render/simulate.h"
 #include "studies/axes.h"
+#include "studies/external.h"
 
 namespace rugae {
 
@@ -33,9 +34,13 @@ struct Gate {
 struct StudyOptions {
   std::string title = "A stomach, simulated and reconstructed";
   std::vector<std::string> cameras, trajectories, methods{"paper"};
-  std::vector<std::uint64_t> seeds{1};  // each draws the stomach, the paths and the noise anew
-  std::vector<Variant> variants{1};     // at least one
+  std::vector<ExternalMethod> commands;  // methods that are programs of their own
+  std::vector<std::uint64_t> seeds{1};   // each draws the stomach, the paths and the noise anew
+  std::vector<Variant> variants{1};      // at least one
   std::vector<Gate> gates;
+
+  /// Null for a method of ours.
+  const ExternalMethod* command_of(const std::string& method) const;
 };
 
 /// Reads a study file; throws Error with file, line and column for an unknown key, a wrong type,

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/check.h"
+#include "core/files.h"
 #include "core/presets.h"
 #include "studies/cell.h"
 
@@ -135,6 +136,17 @@ TEST(StudyFile, AGateCanHoldForSomeOfTheAxes) {
             "study.yaml:4:62: 25 is no value of the axis 'frames': 12, 24");
   EXPECT_EQ(error_of(gate("frame: 24")),
             "study.yaml:4:61: 'frame' is no axis of the study; did you mean 'frames'?");
+}
+
+// The example of docs/studies.md, word for word.
+TEST(StudyFile, TheExampleOfTheDocsReads) {
+  const std::string page = read_text(preset_root() / "docs" / "studies.md");
+  const std::string open = "```yaml\n";
+  const std::size_t begin = page.find(open);
+  ASSERT_NE(begin, std::string::npos);
+  const std::string text =
+      page.substr(begin + open.size(), page.find("```", begin + open.size()) - begin - open.size());
+  EXPECT_EQ(cells_of(read_study_text(text, "docs/studies.md")).size(), 48u);
 }
 
 }  // namespace
