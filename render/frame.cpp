@@ -61,6 +61,13 @@ void store(const Scratch& s, const RayTable& rays, const RenderOptions& options,
   }
 }
 
+// For the rays that met no wall.
+void store_nothing(const Tile& tile, CleanFrame& frame) {
+  for (int lane = 0; lane < tile.count; ++lane)
+    if (!tile.hit[lane].met()) frame.radiance.ptr<Vec3f>()[tile.pixel[lane]].setZero();
+  label_nothing(tile, frame.truth);
+}
+
 }  // namespace
 
 FrameRenderer::FrameRenderer(const Scene& scene, const Camera& camera, const RenderOptions& options)
@@ -76,9 +83,9 @@ FrameRenderer::FrameRenderer(Surface surface, const Camera& camera, const Render
 CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous,
                                  const FrameView* next, RenderTimes* times) const {
   CleanFrame frame;
-  frame.radiance = cv::Mat(rays_.height, rays_.width, CV_32FC3, cv::Scalar::all(0.0));
+  frame.radiance.create(rays_.height, rays_.width, CV_32FC3);  // every pixel is in a tile
   frame.truth =
-      empty_truth(rays_.width, rays_.height, previous != nullptr, next != nullptr, options_.labels);
+      new_truth(rays_.width, rays_.height, previous != nullptr, next != nullptr, options_.labels);
 
   if (options_.keep_materials) frame.materials.resize(rays_.size());
   const Wall& wall = wall_of(now);
@@ -107,6 +114,7 @@ CleanFrame FrameRenderer::render(const FrameView& now, const FrameView* previous
       if (options_.paths.bounces > 0)
         s->paths->trace(camera_.lights, wall, s->tile, s->surface,
                         static_cast<std::uint32_t>(now.index), s->indirect);
+      if (s->surface.count < s->tile.count) store_nothing(s->tile, frame);
       store(*s, rays_, options_, frame);
       if (options_.keep_materials)
         for (int k = 0; k < s->surface.count; ++k)

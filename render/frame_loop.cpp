@@ -132,7 +132,7 @@ void FrameLoop::write(Shot& shot) {
   const SensorImages images = stages_.sensor.digitise(radiance, exposure, shot.frame, truth.masks,
                                                       stages_.output.adc, &sensor_s);
   for (cv::Mat* part : {&truth.diffuse, &truth.specular, &truth.indirect})
-    if (!part->empty()) *part = stages_.sensor.relative(*part, exposure);
+    if (!part->empty()) stages_.sensor.make_relative(*part, exposure);
   ExtraImages extra{images.adc_bgr, images.mosaic, {}, {}};
   if (stages_.output.radiance) extra.radiance = stages_.sensor.relative(radiance, exposure);
   if (stages_.output.paired) {

@@ -1,9 +1,12 @@
 #include "render/labels.h"
 
 #include <cmath>
+#include <limits>
 
 namespace rugae {
 namespace {
+
+constexpr float kNowhere = std::numeric_limits<float>::quiet_NaN();
 
 // What flow in either direction needs of a lane.
 struct Seen {
@@ -57,6 +60,7 @@ void label_flow(const Tile& tile, const LensProjector& lens, const Wall& wall,
   for (int lane = 0; lane < tile.count; ++lane) {
     lands[lane] = faces[lane] = 0;
     if (!seen[lane].met) continue;
+    flow_px[tile.pixel[lane]].setConstant(kNowhere);
     const Vec2 pixel(tile.column[lane] + 0.5, tile.row[lane] + 0.5);
     const auto at = [&](double offset_s) { return follow.point(lane, seen[lane], offset_s); };
     double offset_s = 0.0;
@@ -97,17 +101,35 @@ void label_flow(const Tile& tile, const LensProjector& lens, const Wall& wall,
 
 }  // namespace
 
-FrameTruth empty_truth(int width, int height, bool has_previous, bool has_next,
-                       const LabelSet& labels) {
+FrameTruth new_truth(int width, int height, bool has_previous, bool has_next,
+                     const LabelSet& labels) {
   FrameTruth truth;
   for (const LabelImage& label : label_images()) {
     if (!(labels.*label.wanted)) continue;
     if (label.wanted == &LabelSet::flow && !has_next) continue;
     if (label.wanted == &LabelSet::backward_flow && !has_previous) continue;
-    truth.*label.image = cv::Mat(height, width, label.type, cv::Scalar::all(label.nothing));
+    (truth.*label.image).create(height, width, label.type);
   }
-  if (!labels.masks) truth.masks = cv::Mat(height, width, CV_8U, cv::Scalar(0));
+  truth.masks = cv::Mat(height, width, CV_8U, cv::Scalar(0));  // bits are added to it
   return truth;
+}
+
+void label_nothing(const Tile& tile, FrameTruth& truth) {
+  for (const LabelImage& label : label_images()) {
+    cv::Mat& image = truth.*label.image;
+    if (image.empty() || &image == &truth.masks) continue;
+    const auto channels = static_cast<std::size_t>(image.channels());
+    for (int lane = 0; lane < tile.count; ++lane) {
+      if (tile.hit[lane].met()) continue;
+      const std::size_t first = channels * static_cast<std::size_t>(tile.pixel[lane]);
+      for (std::size_t c = first; c < first + channels; ++c) {
+        if (image.depth() == CV_32F)
+          image.ptr<float>()[c] = static_cast<float>(label.nothing);
+        else
+          image.ptr<unsigned char>()[c] = static_cast<unsigned char>(label.nothing);
+      }
+    }
+  }
 }
 
 void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& lens,

@@ -8,10 +8,10 @@
 
 namespace rugae {
 
-/// Matrices of the frame's size, filled with "nothing was hit" (light: none), of the wanted labels,
-/// and masks in any case; flow only where there is a frame to flow to.
-FrameTruth empty_truth(int width, int height, bool has_previous, bool has_next,
-                       const LabelSet& labels);
+/// Matrices of the frame's size of the wanted labels, to be filled tile by tile, and masks in any
+/// case, which are 0; flow only where there is a frame to flow to.
+FrameTruth new_truth(int width, int height, bool has_previous, bool has_next,
+                     const LabelSet& labels);
 
 /// The pixels of a label, row by row; null where there is no such label.
 template <typename T>
@@ -31,8 +31,11 @@ struct LabelView {
   const OtherFrame* next = nullptr;
 };
 
+/// Writes into every label that the tile's rays which met no wall saw none (light: 0).
+void label_nothing(const Tile& tile, FrameTruth& truth);
+
 /// Writes depth, range, normal, flow, triangle and the masks valid, flow valid and flow occluded of
-/// the tile's pixels, as far as `truth` has them.
+/// the tile's pixels that met the wall, as far as `truth` has them.
 ///
 /// Flow leads to where the same material point (triangle and barycentric coordinates) lands in the
 /// other frame, at the time at which the row it lands in is exposed. It is occluded there when the
@@ -42,8 +45,7 @@ struct LabelView {
 void label_tile(const Tile& tile, const RayTable& rays, const LensProjector& lens,
                 const LabelView& view, FrameTruth& truth);
 
-/// Writes shading normal, albedo, region and instance of the tile's pixels, as far as `truth` has
-/// them.
+/// Writes shading normal, albedo, region and instance likewise.
 void label_surface(const Tile& tile, const SurfaceTile& surface, FrameTruth& truth);
 
 }  // namespace rugae

@@ -77,9 +77,14 @@ SensorOptions faultless(SensorOptions options) {
 }
 
 cv::Mat SensorModel::relative(const cv::Mat& radiance, const Exposure& exposure) const {
-  cv::Mat share;
-  radiance.convertTo(share, CV_32F, exposure.gain * electrons(1.0, exposure) / sensor_.full_well_e);
+  cv::Mat share = radiance.clone();
+  make_relative(share, exposure);
   return share;
+}
+
+void SensorModel::make_relative(cv::Mat& radiance, const Exposure& exposure) const {
+  const double scale = exposure.gain * electrons(1.0, exposure) / sensor_.full_well_e;
+  radiance.convertTo(radiance, CV_32F, scale);
 }
 
 float SensorModel::numbers_per_electron(const Exposure& exposure) const {

@@ -44,6 +44,7 @@ class SensorModel {
   }
   /// CV_32FC3, RGB: the light in units of the ADC's full scale, not clipped.
   cv::Mat relative(const cv::Mat& radiance, const Exposure& exposure) const;
+  void make_relative(cv::Mat& radiance, const Exposure& exposure) const;  // the same in place
   /// The ADC's number for electrons, round half up, clipped to its range.
   int adc(float electrons, const Exposure& exposure) const;
   /// The 8-bit value of an ADC number (without white balance).
