@@ -14,8 +14,7 @@ NoiseTile::NoiseTile(const std::function<Channels(const Vec3&)>& value, const Ch
   tbb::parallel_for(0, kStored, [&](int z) {
     for (int y = 0; y < kStored; ++y)
       for (int x = 0; x < kStored; ++x) {
-        const Vec3 place(x % kVoxels, y % kVoxels, z % kVoxels);
-        const Channels v = value(place * (static_cast<double>(kCells) / kVoxels));
+        const Channels v = value(Vec3(x, y, z) * (static_cast<double>(kCells) / kVoxels));
         std::int16_t* const voxel = voxels_.data() + 4 * x + kNextY * y + kNextZ * z;
         for (int c = 0; c < 4; ++c)
           voxel[c] = static_cast<std::int16_t>(

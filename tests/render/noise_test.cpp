@@ -170,8 +170,9 @@ TEST(Noise, FourPixelsAreTheSame) {
   for (const double read_e : {0.3, 10.0}) {
     const ElectronNoise noise(read_e, 3);
     for (const float dark_e : {0.0f, 5.0f, 70.0f, 500.0f, -1.0f}) {
-      alignas(16) const float mean[3][4] = {
-          {900.0f, 700.0f, dark_e, 5000.0f}, {200.0f, dark_e, 100.0f, 90.0f}, {80, 400, 80, 300}};
+      alignas(16) const float mean[3][4] = {{900.0f, 700.0f, dark_e, 5000.0f},
+                                            {200.0f, dark_e, 100.0f, 90.0f},
+                                            {80.0f, 400.0f, 80.0f, dark_e}};
       const Float4x3 means{_mm_load_ps(mean[0]), _mm_load_ps(mean[1]), _mm_load_ps(mean[2])};
       const Float4x3 electrons = noise(means, 9, 1234);
       alignas(16) float four[3][4];
