@@ -167,7 +167,7 @@ TEST(Noise, FourNormalNumbersAreTheSame) {
 
 // Bright pixels and dark ones, side by side and alone.
 TEST(Noise, FourPixelsAreTheSame) {
-  for (const double read_e : {0.3, 10.0}) {
+  for (const double read_e : {0.3, 4.0, 10.0}) {
     const ElectronNoise noise(read_e, 3);
     for (const float dark_e : {0.0f, 5.0f, 70.0f, 500.0f, -1.0f}) {
       alignas(16) const float mean[3][4] = {{900.0f, 700.0f, dark_e, 5000.0f},
