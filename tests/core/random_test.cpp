@@ -1,9 +1,10 @@
 #include "core/random.h"
-#include "core/random4.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
+
+#include "core/random4.h"
 
 namespace rugae {
 namespace {

@@ -329,7 +329,7 @@ TEST_F(SceneFiles, BrokenDistributionsAreRefused) {
         << text << ": " << message;
   };
   for (const char* key : {"scale", "relief.areae_depth_mm", "mucosa.oil", "objects.mucus",
-                                 "lesions.polyp", "objects.debris"})
+                          "lesions.polyp", "objects.debris"})
     for (const std::string& distribution : broken) refused(key, distribution);
   for (const char* fraction : {"{choice: [1.5]}", "{uniform: [0.2, 0.4]}"})
     refused("lesions.polyp", fraction);
