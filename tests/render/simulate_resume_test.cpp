@@ -29,22 +29,25 @@ TEST_F(Simulate, AKilledRunGoesOn) {
   expect_same("whole", "killed");
 }
 
-// A process of its own, killed for good in the middle of its work.
-TEST_F(Simulate, AProcessKilledInTheMiddleGoesOn) {
+class Resume : public Simulate {
+ protected:
+  // For a process of its own: it ends for good as soon as the frame is on disk.
+  void run_until_killed_at(int frame) {
+    const fs::path started = DatasetLayout{root_ / "killed"}.frame(frame);
+    std::jthread killer([started] {
+      while (!fs::exists(started)) std::this_thread::yield();
+      kill(getpid(), SIGKILL);
+    });
+    run("killed");
+    // Too late: never reached unless sixty frames are written faster than one is noticed.
+    _exit(0);
+  }
+};
+
+TEST_F(Resume, AProcessKilledInTheMiddleGoesOn) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   options_.frames = 60;
-  EXPECT_EXIT(
-      {
-        const fs::path started = DatasetLayout{root_ / "killed"}.frame(4);
-        std::jthread killer([started] {
-          while (!fs::exists(started)) std::this_thread::yield();
-          kill(getpid(), SIGKILL);
-        });
-        run("killed");
-        // Too late: never reached unless sixty frames are written faster than one is noticed.
-        _exit(0);
-      },
-      testing::KilledBySignal(SIGKILL), "");
+  EXPECT_EXIT(run_until_killed_at(4), testing::KilledBySignal(SIGKILL), "");
   EXPECT_FALSE(fs::exists(DatasetLayout{root_ / "killed"}.manifest()));
   const SimulateResult result = run("killed");
   EXPECT_GT(result.skipped, 0);
@@ -83,21 +86,11 @@ TEST_F(Simulate, AutomaticExposureHasTheSameBytesHoweverItIsRun) {
   EXPECT_FALSE(fs::exists(alone.frame(6)));
 }
 
-TEST_F(Simulate, AutomaticExposureGoesOnAfterAKill) {
+TEST_F(Resume, AutomaticExposureGoesOnAfterAKill) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   options_.render.sensor.exposure = ExposureMode::automatic;
   options_.frames = 60;
-  EXPECT_EXIT(
-      {
-        const fs::path started = DatasetLayout{root_ / "killed"}.frame(9);
-        std::jthread killer([started] {
-          while (!fs::exists(started)) std::this_thread::yield();
-          kill(getpid(), SIGKILL);
-        });
-        run("killed");
-        _exit(0);
-      },
-      testing::KilledBySignal(SIGKILL), "");
+  EXPECT_EXIT(run_until_killed_at(9), testing::KilledBySignal(SIGKILL), "");
   const DatasetLayout killed{root_ / "killed"};
   // also frames behind which others are there
   for (int i : {2, 5}) fs::remove(killed.frame(i));
