@@ -92,10 +92,10 @@ void draw_preprocess(const fs::path& folder, const FrameSource& frames,
 }
 
 void draw_pairs(const fs::path& folder, const FrameSource& frames,
-                const std::vector<PairAlignment>& pairs, const std::vector<int>& which) {
+                const std::vector<PairAlignment>& pairs) {
   const fs::path flow_folder = stage(folder, "flow"), inlier_folder = stage(folder, "inliers");
-  for (const int p : which) {
-    const PairAlignment& pair = pairs[p];
+  for (const PairAlignment& pair : pairs) {
+    if (pair.reference_px.empty()) continue;
     const std::string name = fmt::format("{:06}-{:06}.png", pair.reference, pair.moving);
     const cv::Mat reference = frames.gray(pair.reference);
     const cv::Mat flow = farneback_flow(reference, frames.gray(pair.moving), {}, frames.valid());

@@ -16,9 +16,10 @@ namespace rugae {
 /// preprocess: original, mask, inpainted and final picture of some frames, the vignetting gain.
 void draw_preprocess(const std::filesystem::path& folder, const FrameSource& frames,
                      const std::vector<int>& indices, const PreprocessOptions& options);
-/// flow and inliers: for some pairs, the flow and the correspondences over the reference frame.
+/// flow and inliers: for the pairs that have correspondences, the flow and these over the reference
+/// frame.
 void draw_pairs(const std::filesystem::path& folder, const FrameSource& frames,
-                const std::vector<PairAlignment>& pairs, const std::vector<int>& which);
+                const std::vector<PairAlignment>& pairs);
 /// tracks: the points of some key frames over them, coloured by the number of key frames that see
 /// them.
 void draw_tracks(const std::filesystem::path& folder, const FrameSource& frames,

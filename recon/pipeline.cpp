@@ -9,13 +9,9 @@
 #include "core/check.h"
 #include "core/files.h"
 #include "dataset/image_io.h"
-#include "recon/keyframes.h"
 #include "recon/map.h"
 #include "recon/mosaic.h"
 #include "recon/pictures.h"
-#include "recon/resection.h"
-#include "recon/structure.h"
-#include "recon/tracks.h"
 
 namespace rugae {
 namespace {
@@ -25,12 +21,12 @@ constexpr int kDepthMapsAtOnce = 16;  // between two steps of the progress line
 
 std::vector<std::optional<MosaicDepth>> place_all(const std::vector<Mosaic>& mosaics,
                                                   const Structure& structure, const Lens& lens,
-                                                  const ShadingOptions& options,
+                                                  const ReconOptions& options, const Stages& stages,
                                                   Progress& progress) {
   progress.begin("shape from shading", mosaics.size());
   std::vector<std::optional<MosaicDepth>> depths;
   for (const Mosaic& mosaic : mosaics) {
-    depths.push_back(place_mosaic(mosaic, structure, lens, options));
+    depths.push_back(stages.depth(mosaic, structure, lens, options));
     progress.step();
   }
   const auto placed = std::ranges::count_if(depths, [](const auto& d) { return d.has_value(); });
@@ -60,7 +56,9 @@ void write_depth(const EstimateLayout& layout, const TriangleMesh& map, const St
 
 // What a reader of estimate.json wants to know of the run.
 Estimate estimate_of(const Observations& observations, const ReconOptions& options,
-                     const Structure& structure, const std::vector<std::optional<Rigid3>>& poses) {
+                     const Motion& motion) {
+  const Structure& structure = motion.structure;
+  const std::vector<std::optional<Rigid3>>& poses = motion.cam_from_world;
   Estimate e;
   e.method = options.method;
   e.options_json = to_json_text(options);
@@ -93,50 +91,47 @@ Estimate estimate_of(const Observations& observations, const ReconOptions& optio
 
 }  // namespace
 
-Estimate reconstruct(const Observations& observations, const ReconOptions& options,
-                     const std::filesystem::path& out, Progress& progress) {
-  options.check();
+Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconOptions& options,
+                   const std::filesystem::path& out, const Stages& stages, Progress& progress) {
   const EstimateLayout layout{out};
   make_folder(out);
-  progress.begin("preprocessing");
-  const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());    // of the caller
-  const FrameSource frames(observations, options.preprocess);                    // section 2.1
-  const Keyframes keys = select_keyframes(frames, options.keyframes, progress);  // algorithm 2
-  // Algorithm 3: steps 2 to 6, pairs; step 7, all poses jointly.
-  Followed followed =
-      follow_tracks(frames, keys, options.align, options.tracks, options.seed, progress);
-  const Structure structure = build_structure(followed.keyframes, std::move(followed.tracks),
-                                              frames.lens(), options.bundle, progress);
-  const auto poses =
-      resect_frames(frames, structure, options.align, options.bundle, options.seed, progress);
-  const auto usable = std::ranges::count_if(poses, [](const auto& p) { return p.has_value(); });
-  check(
-      usable >= 2,
-      "{}: {} usable frames of {}, expected at least 2: the others show too little texture, light "
-      "or common wall to be placed",
-      observations.name(), usable, observations.size());
+  progress.end();
+  const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());  // of the caller
+  const Structure& structure = motion.structure;
 
-  progress.begin("mosaics");  // steps 8 to 10
-  const auto mosaics = compose_mosaics(frames, structure, followed.pairs, options.mosaic);
-  const auto depths = place_all(mosaics, structure, frames.lens(), options.shading, progress);
+  progress.begin("mosaics");  // algorithm 3, steps 8 to 10
+  const auto mosaics = compose_mosaics(frames, structure, motion.pairs, options.mosaic);
+  const auto depths = place_all(mosaics, structure, frames.lens(), options, stages, progress);
   progress.begin("map");
-  Estimate estimate = estimate_of(observations, options, structure, poses);
+  Estimate estimate = estimate_of(frames.observations(), options, motion);
   estimate.map = fuse_map(mosaics, depths, structure, frames.lens(), options.map);
-  write_depth(layout, estimate.map, structure, observations.lens(), progress);
+  write_depth(layout, estimate.map, structure, frames.observations().lens(), progress);
   if (options.pictures) {
     progress.begin("pictures");
-    const auto key_frames = spread(static_cast<int>(followed.keyframes.size()), kPictures);
     draw_preprocess(layout.pictures(), frames, spread(frames.size(), kPictures),
                     options.preprocess);
-    draw_pairs(layout.pictures(), frames, followed.pairs,
-               spread(static_cast<int>(followed.pairs.size()), kPictures));
-    draw_tracks(layout.pictures(), frames, structure, key_frames);
+    draw_pairs(layout.pictures(), frames, motion.pairs);
+    draw_tracks(layout.pictures(), frames, structure,
+                spread(static_cast<int>(structure.frames.size()), kPictures));
     draw_mosaics(layout.pictures(), mosaics, depths, 2 * kPictures);
   }
   progress.end();
-  estimate.stages.assign(progress.stages().begin() + earlier, progress.stages().end());
+  estimate.stages = motion.stages;
+  estimate.stages.insert(estimate.stages.end(), progress.stages().begin() + earlier,
+                         progress.stages().end());
   write_estimate(out, estimate);
   return estimate;
+}
+
+Estimate reconstruct(const Observations& observations, const ReconOptions& options,
+                     const std::filesystem::path& out, Progress& progress) {
+  options.check();
+  make_folder(out);
+  const Stages stages;
+  progress.begin("preprocessing");
+  const FrameSource frames(observations, options.preprocess);  // section 2.1
+  const Motion motion = estimate_motion(frames, options, stages, progress);
+  return build_map(frames, motion, options, out, stages, progress);
 }
 
 }  // namespace rugae

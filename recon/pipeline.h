@@ -7,7 +7,9 @@
 #include "core/progress.h"
 #include "dataset/estimate.h"
 #include "dataset/observations.h"
+#include "recon/motion.h"
 #include "recon/options.h"
+#include "recon/stages.h"
 
 namespace rugae {
 
@@ -15,5 +17,10 @@ namespace rugae {
 /// for fewer than two usable frames; frames that cannot be placed are `lost`, not errors.
 Estimate reconstruct(const Observations& observations, const ReconOptions& options,
                      const std::filesystem::path& out, Progress& progress);
+
+/// The second half alone, with a motion from estimate_motion(), perhaps of an earlier run: mosaics,
+/// shape from shading, map, depth and pictures. `frames` are preprocessed as `options` say.
+Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconOptions& options,
+                   const std::filesystem::path& out, const Stages& stages, Progress& progress);
 
 }  // namespace rugae

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/check.h"
+#include "recon/motion.h"
 
 namespace rugae {
 namespace {
@@ -40,6 +41,29 @@ TEST(ReconOptionsTest, YamlSetsWhatItNamesAndKeepsTheRest) {
   EXPECT_NEAR(options.mosaic.max_view_angle_rad, 0.5235987755982988, 1e-15);
   EXPECT_EQ(options.seed, 9u);
   EXPECT_EQ(options.align.grid_px, AlignOptions().grid_px);
+}
+
+// What only the map looks at leaves the motion as it is; everything else may change it.
+TEST(ReconOptionsTest, TheMotionDependsOnAllButTheMap) {
+  const auto motion_of = [](const std::string& text) {
+    return to_json_text(motion_options(read(text)));
+  };
+  const std::string plain = to_json_text(motion_options({}));
+  for (const char* same :
+       {"mosaic: {bands: 2}", "shading: {iterations: 3}", "map: {voxel_share: 0.1}",
+        "pictures: false", "preprocess: {reflections: {suppress_for_map: false}}",
+        "preprocess: {reflections: {inpainting: navier_stokes, inpaint_radius_px: 5}}"})
+    EXPECT_EQ(motion_of(same), plain) << same;
+  for (const char* other :
+       {"preprocess: {undistort: false}", "preprocess: {devignette: false}",
+        "preprocess: {reflections: {suppress_for_pose: true}}",
+        "preprocess: {reflections: {closing_px: 5}}", "keyframes: {mean_flow_px: 20}",
+        "align: {grid_px: 10}", "tracks: {spacing_px: 20}", "bundle: {huber_px: 2}", "seed: 2"})
+    EXPECT_NE(motion_of(other), plain) << other;
+  const std::string painted = "preprocess: {reflections: {suppress_for_pose: true}}";
+  EXPECT_NE(motion_of("preprocess: {reflections: {suppress_for_pose: true, inpainting: "
+                      "navier_stokes}}"),
+            motion_of(painted));
 }
 
 TEST(ReconOptionsTest, BrokenValuesAreNamedWithTheirPlace) {

@@ -8,6 +8,7 @@
 #include <tbb/global_control.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 
 #include "core/check.h"
@@ -81,6 +82,52 @@ TEST_F(Pipeline, FindsThePathFromPicturesAndTheBytesDoNotDependOnThreads) {
   cv::setNumThreads(-1);
   for (const char* file : {"trajectory.txt", "frames.csv", "points.ply", "map.ply"})
     EXPECT_EQ(read_text(root_ / "one" / file), read_text(root_ / "two" / file)) << file;
+}
+
+// A motion read back from disk makes the same map, to the byte; one with another depth stage,
+// another.
+TEST_F(Pipeline, TheMapIsMadeFromAMotionOnDisk) {
+  ReconOptions options;
+  options.keyframes.mean_flow_px = 15.0;
+  options.pictures = true;
+  Progress progress(Progress::Output::silent);
+  const Observations observations = Observations::open(recording_.images, recording_.calibration);
+  const fs::path whole = root_ / "whole", halves = root_ / "halves";
+  const Estimate at_once = reconstruct(observations, options, whole, progress);
+
+  const FrameSource frames(observations, options.preprocess);
+  write_motion(root_ / "motion.cbor", estimate_motion(frames, options, Stages(), progress));
+  const Motion motion = read_motion(root_ / "motion.cbor");
+  const Estimate in_halves = build_map(frames, motion, options, halves, Stages(), progress);
+  for (const char* file : {"trajectory.txt", "frames.csv", "points.ply", "map.ply"})
+    EXPECT_EQ(read_text(whole / file), read_text(halves / file)) << file;
+  EXPECT_EQ(at_once.numbers, in_halves.numbers);
+  const auto shown = std::ranges::find_if(
+      motion.pairs, [](const PairAlignment& pair) { return !pair.reference_px.empty(); });
+  ASSERT_NE(shown, motion.pairs.end());
+  const std::string pair = fmt::format("{:06}-{:06}.png", shown->reference, shown->moving);
+  EXPECT_EQ(read_text(whole / "pictures" / "inliers" / pair),
+            read_text(halves / "pictures" / "inliers" / pair));
+  EXPECT_EQ(in_halves.stages.front().name, motion.stages.front().name);
+  EXPECT_EQ(in_halves.stages.back().name, "pictures");
+
+  Stages blind;
+  blind.depth = [](const Mosaic&, const Structure&, const Lens&, const ReconOptions&) {
+    return std::optional<MosaicDepth>();
+  };
+  EXPECT_TRUE(build_map(frames, motion, options, root_ / "blind", blind, progress).map.empty());
+
+  write_atomic(root_ / "cut.cbor", read_text(root_ / "motion.cbor").substr(0, 5000));
+  write_atomic(root_ / "other.cbor", R"({"format": "another"})");
+  for (const char* file : {"cut.cbor", "other.cbor"}) {
+    try {
+      read_motion(root_ / file);
+      ADD_FAILURE() << "expected an Error: " << file;
+    } catch (const Error& error) {
+      EXPECT_TRUE(std::string(error.what()).starts_with((root_ / file).string() + ": "))
+          << error.what();
+    }
+  }
 }
 
 TEST_F(Pipeline, FramesWithoutTextureAreLostNotErrors) {

@@ -1,0 +1,65 @@
+#include "recon/motion.h"
+
+#include <algorithm>
+
+#include "core/check.h"
+#include "recon/pictures.h"
+
+namespace rugae {
+namespace {
+
+constexpr int kPairsForPictures = 6;
+
+// A pair has thousands of correspondences, and the tracks hold what is needed of them.
+void keep_for_pictures(std::vector<PairAlignment>& pairs) {
+  const std::vector<int> kept = spread(static_cast<int>(pairs.size()), kPairsForPictures);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (std::ranges::binary_search(kept, static_cast<int>(i))) continue;
+    pairs[i].reference_px = pairs[i].moving_px = {};
+    pairs[i].point_index = {};
+  }
+}
+
+}  // namespace
+
+Motion estimate_motion(const FrameSource& frames, const ReconOptions& options, const Stages& stages,
+                       Progress& progress) {
+  const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());    // of the caller
+  const Keyframes keys = select_keyframes(frames, options.keyframes, progress);  // algorithm 2
+  // Algorithm 3: steps 2 to 6, pairs; step 7, all poses jointly.
+  Followed followed = stages.follow(frames, keys, options, progress);
+  Motion motion;
+  motion.structure =
+      stages.structure(frames, followed.keyframes, std::move(followed.tracks), options, progress);
+  motion.cam_from_world = stages.resect(frames, motion.structure, options, progress);
+  progress.end();
+  motion.pairs = std::move(followed.pairs);
+  keep_for_pictures(motion.pairs);
+  motion.stages.assign(progress.stages().begin() + earlier, progress.stages().end());
+
+  const auto usable =
+      std::ranges::count_if(motion.cam_from_world, [](const auto& p) { return p.has_value(); });
+  check(
+      usable >= 2,
+      "{}: {} usable frames of {}, expected at least 2: the others show too little texture, light "
+      "or common wall to be placed",
+      frames.observations().name(), usable, frames.size());
+  return motion;
+}
+
+ReconOptions motion_options(ReconOptions options) {
+  const ReconOptions defaults;
+  ReflectionOptions& reflections = options.preprocess.reflections;
+  reflections.suppress_for_map = defaults.preprocess.reflections.suppress_for_map;
+  if (!reflections.suppress_for_pose) {
+    reflections.inpainting = defaults.preprocess.reflections.inpainting;
+    reflections.inpaint_radius_px = defaults.preprocess.reflections.inpaint_radius_px;
+  }
+  options.mosaic = defaults.mosaic;
+  options.shading = defaults.shading;
+  options.map = defaults.map;
+  options.pictures = defaults.pictures;
+  return options;
+}
+
+}  // namespace rugae

@@ -1,0 +1,30 @@
+#include "recon/stages.h"
+
+#include <utility>
+
+#include "recon/resection.h"
+
+namespace rugae {
+
+Stages::Stages()
+    : follow([](const FrameSource& frames, const Keyframes& keyframes, const ReconOptions& options,
+                Progress& progress) {
+        return follow_tracks(frames, keyframes, options.align, options.tracks, options.seed,
+                             progress);
+      }),
+      structure([](const FrameSource& frames, const std::vector<int>& keyframes,
+                   std::vector<Track> tracks, const ReconOptions& options, Progress& progress) {
+        return build_structure(keyframes, std::move(tracks), frames.lens(), options.bundle,
+                               progress);
+      }),
+      resect([](const FrameSource& frames, const Structure& structure, const ReconOptions& options,
+                Progress& progress) {
+        return resect_frames(frames, structure, options.align, options.bundle, options.seed,
+                             progress);
+      }),
+      depth([](const Mosaic& mosaic, const Structure& structure, const Lens& lens,
+               const ReconOptions& options) {
+        return place_mosaic(mosaic, structure, lens, options.shading);
+      }) {}
+
+}  // namespace rugae
