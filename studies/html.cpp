@@ -10,24 +10,6 @@
 namespace rugae::html {
 namespace {
 
-// RFC 4648, section 4.
-std::string base64(const std::vector<unsigned char>& bytes) {
-  static constexpr char kLetters[] =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t left = bytes.size() - i;
-    const unsigned triple =
-        (bytes[i] << 16) | ((left > 1 ? bytes[i + 1] : 0) << 8) | (left > 2 ? bytes[i + 2] : 0);
-    text += kLetters[(triple >> 18) & 63];
-    text += kLetters[(triple >> 12) & 63];
-    text += left > 1 ? kLetters[(triple >> 6) & 63] : '=';
-    text += left > 2 ? kLetters[triple & 63] : '=';
-  }
-  return text;
-}
-
 std::string encoded(const cv::Mat& image, int max_width_px, const std::string& extension,
                     const std::vector<int>& parameters) {
   check(!image.empty() && image.depth() == CV_8U, "report: a picture is empty or not of 8 bits");
@@ -85,8 +67,28 @@ std::string figure(const std::string& data_uri, const std::string& alt,
       data_uri, escape(alt), caption);
 }
 
+std::string base64(const std::vector<unsigned char>& bytes) {
+  static constexpr char kLetters[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t left = bytes.size() - i;
+    const unsigned triple =
+        (bytes[i] << 16) | ((left > 1 ? bytes[i + 1] : 0) << 8) | (left > 2 ? bytes[i + 2] : 0);
+    text += kLetters[(triple >> 18) & 63];
+    text += kLetters[(triple >> 12) & 63];
+    text += left > 1 ? kLetters[(triple >> 6) & 63] : '=';
+    text += left > 2 ? kLetters[triple & 63] : '=';
+  }
+  return text;
+}
+
 std::string Table::str() const {
-  std::string out = "<div class=\"table\"><table><thead><tr>";
+  std::string out =
+      "<div class=\"table\"><table" + std::string(sortable ? " class=\"sortable\"" : "") + ">";
+  if (!caption.empty()) out += "<caption>" + caption + "</caption>";
+  out += "<thead><tr>";
   for (const std::string& cell : head) out += "<th>" + cell + "</th>";
   out += "</tr></thead><tbody>\n";
   for (const auto& row : rows) {
@@ -95,6 +97,19 @@ std::string Table::str() const {
     out += "</tr>\n";
   }
   return out + "</tbody></table></div>\n";
+}
+
+std::string json_script(const std::string& css_class, const std::string& json) {
+  check(!json.empty(), "report: no data for the page's {}", css_class);
+  std::string out = "<script type=\"application/json\" class=\"" + css_class + "\">";
+  // In JSON a < stands only inside strings, where it may be written otherwise: nothing then ends
+  // the script early.
+  for (const char c : json)
+    if (c == '<')
+      out += "\\u003c";
+    else
+      out += c;
+  return out + "</script>\n";
 }
 
 std::string number(double value, int digits) {

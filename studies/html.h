@@ -21,8 +21,17 @@ std::string figure(const std::string& data_uri, const std::string& alt, const st
 struct Table {
   std::vector<std::string> head;  // HTML, as the cells are; the first column is left-aligned
   std::vector<std::vector<std::string>> rows;
+  bool sortable = false;     // by a click on the head, where the page has its viewer
+  std::string caption = {};  // HTML
   std::string str() const;
 };
+
+/// JSON text for the page's viewer: <script type="application/json" class="CSS_CLASS">. Throws
+/// Error where it is empty.
+std::string json_script(const std::string& css_class, const std::string& json);
+
+/// Bytes as text: RFC 4648, section 4.
+std::string base64(const std::vector<unsigned char>& bytes);
 
 /// "12.3" with `digits` significant digits and without a useless exponent; a dash for NaN.
 std::string number(double value, int digits = 3);
