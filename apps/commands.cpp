@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "apps/output.h"
 #include "core/check.h"
 #include "core/files.h"
 #include "core/presets.h"
@@ -17,7 +18,6 @@
 #include "dataset/observations.h"
 #include "recon/pipeline.h"
 #include "render/simulate.h"
-#include "studies/study.h"
 #include "validate/evaluate.h"
 
 namespace rugae {
@@ -25,15 +25,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-// Machine-readable on request, else lines for people.
-void print(bool json, const Json& result, const std::string& text) {
-  std::printf("%s\n", json ? result.dump(2).c_str() : text.c_str());
-}
-
-void add_json_flag(CLI::App& command, bool& json) {
-  command.add_flag("--json", json, "Print the result as JSON");
-}
 
 }  // namespace
 
@@ -168,35 +159,6 @@ void add_evaluate(CLI::App& app) {
     const nlohmann::json metrics = evaluate(a->dataset, a->estimate, progress);
     if (!a->out.empty()) write_atomic(a->out, metrics.dump(2) + "\n");
     print(a->json, metrics, summary_text(metrics));
-  });
-}
-
-void add_run(CLI::App& app, int& exit_code) {
-  struct Arguments {
-    fs::path study, out;
-    bool json = false;
-  };
-  const auto a = std::make_shared<Arguments>();
-  CLI::App& command =
-      *app.add_subcommand("run", "The whole loop over a study: tables and a report");
-  command.add_option("study", a->study, "STUDY.yaml or a preset's name")->required();
-  command.add_option("--out", a->out, "The study's folder; a run that was stopped goes on there")
-      ->required();
-  add_json_flag(command, a->json);
-  command.callback([a, &exit_code] {
-    Progress progress;
-    const StudyResult result =
-        run_study(find_preset("studies", "study", a->study.string()), a->out, progress);
-    for (const std::string& gate : result.failed_gates)
-      std::fprintf(stderr, "gate failed: %s\n", gate.c_str());
-    constexpr int kGateFailed = 3;
-    if (!result.failed_gates.empty()) exit_code = kGateFailed;
-    print(a->json,
-          {{"cells", result.cells},
-           {"failed_gates", result.failed_gates},
-           {"report", result.report.string()}},
-          fmt::format("{} cells, {} gates failed, report: {}", result.cells,
-                      result.failed_gates.size(), result.report.string()));
   });
 }
 

@@ -66,6 +66,12 @@ void Progress::end(const std::string& remark) {
   if (!silent_) draw(true, remark);
 }
 
+void Progress::say(const std::string& line) {
+  if (silent_) return;
+  std::fprintf(stderr, "%s%s\n", terminal_ ? "\r\033[K" : "", line.c_str());
+  std::fflush(stderr);
+}
+
 void Progress::draw(bool last, const std::string& remark) {
   const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
   std::string line = fmt::format("{:<24}", stage_);

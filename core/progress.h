@@ -31,6 +31,9 @@ class Progress {
   /// Ends the current stage; `remark` is added to its line, such as "57 of 60 key frames".
   void end(const std::string& remark = {});
 
+  /// A line of its own, without ending the stage.
+  void say(const std::string& line);
+
   const std::vector<StageTime>& stages() const { return stages_; }
 
   /// Makes Ctrl-C set a flag that step() turns into Interrupted; the second Ctrl-C ends the process

@@ -47,6 +47,15 @@ double as_number(const std::string& name, const std::string& key, const YAML::No
   return value;
 }
 
+std::string one_line(const YAML::Node& node) {
+  if (node.IsScalar()) return node.Scalar();
+  YAML::Emitter out;
+  out << YAML::Flow << node;
+  std::string text = out.c_str();
+  std::ranges::replace(text, '\n', ' ');  // long flows are broken into lines
+  return text;
+}
+
 template <int N>
 void read_vector(const std::string& name, const std::string& key, const YAML::Node& node,
                  Eigen::Matrix<double, N, 1>& value) {
@@ -197,6 +206,21 @@ void YamlReader::get_choice(const std::string& key, const std::vector<std::strin
   value = static_cast<int>(it - names.begin());
 }
 
+std::string YamlReader::text(const std::string& key) {
+  const auto* node = find(key);
+  return node ? one_line(*node) : std::string();
+}
+
+std::vector<std::string> YamlReader::texts(const std::string& key) {
+  std::vector<std::string> list;
+  const auto* node = find(key);
+  if (!node) return list;
+  check(node->IsSequence(), "{}: {} is {}, expected a list", place(state_->name, node->Mark()), key,
+        shown(*node));
+  for (const auto& entry : *node) list.push_back(one_line(entry));
+  return list;
+}
+
 std::optional<YamlReader> YamlReader::child(const std::string& key) {
   const auto* node = find(key);
   if (!node) return std::nullopt;
@@ -235,7 +259,10 @@ std::string yaml_with(const std::string& text, const std::string& path, const st
           path.substr(0, begin > 0 ? begin - 1 : 0), shown(at));
     YAML::Node next = at[key];
     if (end == path.size()) {
-      next = value;
+      if (value.starts_with('{') || value.starts_with('['))
+        next = YAML::Load(value);
+      else
+        next = value;
       return YAML::Dump(root);
     }
     at.reset(next);

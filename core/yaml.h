@@ -60,6 +60,11 @@ class YamlReader {
   /// One of `names`; the index is written to `value`. The nearest name is offered otherwise.
   void get_choice(const std::string& key, const std::vector<std::string>& names, int& value);
 
+  /// The value as text: a scalar as it is, a mapping or list in flow style on one line.
+  std::string text(const std::string& key);
+  /// The same of each entry of a list.
+  std::vector<std::string> texts(const std::string& key);
+
   std::optional<YamlReader> child(const std::string& key);
   std::vector<YamlReader> children(const std::string& key);  // a list of mappings
   /// "file:line:column" of a key's value (of the mapping itself where the key is absent): for
@@ -78,8 +83,9 @@ class YamlReader {
 };
 
 /// The same document with `value` at a path of keys such as "render.sensor.noise"; mappings on the
-/// way are made where they are absent. Throws Error where something that is no mapping stands in
-/// the way. Places in the new text are not those in the old.
+/// way are made where they are absent. A value that begins with { or [ is a mapping or a list in
+/// flow style, as YamlReader::text() gives it. Throws Error where something that is no mapping
+/// stands in the way. Places in the new text are not those in the old.
 std::string yaml_with(const std::string& text, const std::string& path, const std::string& value);
 
 }  // namespace rugae

@@ -9,35 +9,78 @@
 namespace rugae {
 namespace {
 
-const std::vector<std::string> kSections = {"render", "recon", "scene", "resolution", "frames"};
+// What a cell is made with, and can so be changed from cell to cell.
+const std::vector<std::string> kSections = {"render", "recon",     "scene",      "resolution",
+                                            "frames", "calibrate", "lens_error", "replace"};
 
-void check_path(const Axis& axis) {
-  const std::string first = axis.path.substr(0, axis.path.find('.'));
-  const bool own_list = first == "cameras" || first == "trajectories" || first == "methods" ||
-                        first == "seed" || first == "seeds";
-  check(!own_list,
-        "{}: axis '{}': cameras, trajectories, methods and seeds have lists of their own",
-        axis.where, axis.path);
+std::string first_key(const std::string& path) { return path.substr(0, path.find('.')); }
+
+bool has_own_list(const std::string& key) {
+  return key == "cameras" || key == "trajectories" || key == "methods" || key == "seed" ||
+         key == "seeds";
+}
+
+void check_path(const std::string& path, const std::string& where) {
+  const std::string first = first_key(path);
+  check(!has_own_list(first),
+        "{}: axis '{}': cameras, trajectories, methods and seeds have lists of their own", where,
+        path);
   check(std::ranges::count(kSections, first) > 0,
-        "{}: axis '{}': no such setting, expected one of: {}{}", axis.where, axis.path,
+        "{}: axis '{}': no such setting, expected one of: {}{}", where, path,
         fmt::join(kSections, ", "), did_you_mean(first, kSections));
 }
 
+Axis read_list(YamlReader& axes, const std::string& path) {
+  Axis axis{path, {}, axes.where(path)};
+  check_path(path, axis.where);
+  for (const std::string& value : axes.texts(path))
+    axis.values.push_back({path, value, {{path, value}}});
+  return axis;
+}
+
+Axis read_bundles(YamlReader& axes, const std::string& name) {
+  Axis axis{name, {}, axes.where(name)};
+  const bool setting = std::ranges::count(kSections, first_key(name)) > 0;
+  check(!setting && !has_own_list(name),
+        "{}: axis '{}' is a mapping, expected a list of its values; only an axis with a name of "
+        "its own has names for its values",
+        axis.where, name);
+  auto values = axes.child(name);
+  for (const std::string& value : values->keys())
+    axis.values.push_back({name, value, read_changes(*values, value)});
+  return axis;
+}
+
 }  // namespace
+
+std::vector<std::string> Axis::names() const {
+  std::vector<std::string> all;
+  for (const Setting& s : values) all.push_back(s.value);
+  return all;
+}
+
+std::vector<Change> read_changes(YamlReader& yaml, const std::string& key) {
+  std::vector<Change> changes;
+  auto mapping = yaml.child(key);
+  if (!mapping) return changes;
+  for (const std::string& path : mapping->keys()) {
+    check_path(path, mapping->where(path));
+    changes.push_back({path, mapping->text(path)});
+  }
+  return changes;
+}
 
 std::vector<Axis> read_axes(YamlReader& study) {
   std::vector<Axis> axes;
   auto yaml = study.child("axes");
   if (!yaml) return axes;
   for (const std::string& path : yaml->keys()) {
-    Axis axis{path, {}, yaml->where(path)};
-    check_path(axis);
-    yaml->get(path, axis.values);
+    Axis axis = yaml->has_mapping(path) ? read_bundles(*yaml, path) : read_list(*yaml, path);
     check(!axis.values.empty(), "{}: axis '{}' is empty, expected at least one value", axis.where,
           path);
-    for (const std::string& value : axis.values)
+    for (const Setting& value : axis.values)
       check(std::ranges::count(axis.values, value) == 1, "{}: axis '{}': {} stands twice",
-            axis.where, path, value);
+            axis.where, path, value.value);
     axes.push_back(std::move(axis));
   }
   return axes;
@@ -48,9 +91,9 @@ std::vector<std::vector<Setting>> combinations(const std::vector<Axis>& axes) {
   for (const Axis& axis : axes) {
     std::vector<std::vector<Setting>> longer;
     for (const auto& settings : all)
-      for (const std::string& value : axis.values) {
+      for (const Setting& value : axis.values) {
         longer.push_back(settings);
-        longer.back().push_back({axis.path, value});
+        longer.back().push_back(value);
       }
     all = std::move(longer);
   }

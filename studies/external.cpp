@@ -1,18 +1,10 @@
 #include "studies/external.h"
 
-#include <fcntl.h>
 #include <fmt/ranges.h>
-#include <spawn.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <csignal>
-#include <cstring>
 #include <map>
 #include <thread>
 
@@ -22,6 +14,7 @@
 #include "dataset/layout.h"
 #include "dataset/observations.h"
 #include "dataset/ply_io.h"
+#include "studies/process.h"
 
 namespace rugae {
 namespace {
@@ -45,62 +38,20 @@ std::string replaced(const std::string& argument, const Value& value) {
   }
 }
 
-struct Ended {
-  int status = 0;  // of waitpid
-  double seconds = 0.0, peak_rss_mb = 0.0;
-};
-
-// Both outputs go to `log`. A wish to stop ends the program, and all that it started.
+// A wish to stop ends the program, and all that it started.
 Ended run(const std::vector<std::string>& command, const fs::path& log, Progress& progress) {
-  std::vector<char*> arguments;
-  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t files;
-  posix_spawn_file_actions_init(&files);
-  posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
-                                   0644);
-  posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);  // a group of its own
-  posix_spawnattr_setpgroup(&attributes, 0);
-  const auto start = std::chrono::steady_clock::now();
-  pid_t child = 0;
-  const int error =
-      posix_spawnp(&child, arguments[0], &files, &attributes, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&files);
-  posix_spawnattr_destroy(&attributes);
-  check(error == 0, "'{}' cannot be started: {}", command[0], std::strerror(error));
-  Ended ended;
-  rusage usage{};
-  for (;;) {
-    const pid_t done = wait4(child, &ended.status, WNOHANG, &usage);
-    if (done == child) break;
-    check(done == 0 || errno == EINTR, "'{}': {}", command[0], std::strerror(errno));
-    try {
-      progress.step(0);
-    } catch (const Interrupted&) {
-      kill(-child, SIGTERM);
-      wait4(child, &ended.status, 0, &usage);
-      throw;
-    }
+  Process process(command, log);
+  while (!process.has_ended()) {
+    progress.step(0);  // throws when that is wished, and the process is stopped
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  ended.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  ended.peak_rss_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;
-  return ended;
+  return process.ended();
 }
 
-void check_success(const std::string& program, int status, const fs::path& log) {
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
-  const std::string how = WIFSIGNALED(status) ? fmt::format("signal {}", WTERMSIG(status))
-                                              : fmt::format("exit code {}", WEXITSTATUS(status));
-  std::string said = read_text(log);
-  while (!said.empty() && said.back() == '\n') said.pop_back();
-  const std::size_t last_line = said.rfind('\n');
-  if (last_line != std::string::npos) said = said.substr(last_line + 1);
-  fail("'{}' ended with {}; its output is in {}{}", program, how, log.string(),
+void check_success(const std::string& program, const Ended& ended, const fs::path& log) {
+  if (ended.success()) return;
+  const std::string said = last_line_of(log);
+  fail("'{}' ended with {}; its output is in {}{}", program, ended.how(), log.string(),
        said.empty() ? ", empty" : ", the last line: " + said);
 }
 
@@ -164,7 +115,7 @@ void reconstruct_by(const ExternalMethod& method, const fs::path& dataset, const
     command.push_back(replaced(argument, [&](const std::string& word) { return values.at(word); }));
   progress.begin(method.name);
   const Ended ended = run(command, log, progress);
-  check_success(command[0], ended.status, log);
+  check_success(command[0], ended, log);
   Estimate made = estimate_from(results, observations);
   made.method = method.name;
   made.stages = {{method.name, ended.seconds, ended.peak_rss_mb}};

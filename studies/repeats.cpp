@@ -65,19 +65,14 @@ std::string repeats_csv(const std::vector<CellResult>& cells) {
   using Values = std::map<std::string, std::vector<double>>;
   std::map<std::string, Values> groups;
   std::vector<std::string> order;  // of the groups, as the cells come
-  for (const CellResult& result : cells) {
-    const Cell& cell = result.cell;
-    std::string key = fmt::format("{},{},{}", csv_field(cell.camera), csv_field(cell.trajectory),
-                                  csv_field(cell.method));
-    for (const Setting& axis : cell.settings) key += "," + csv_field(axis.value);
+  const std::vector<std::string> axes = axis_paths(cells);
+  for (const CellResult& cell : cells) {
+    const std::string key = row_start(cell.cell, axes);
     const auto [group, fresh] = groups.try_emplace(key);
     if (fresh) order.push_back(key);
-    for (const auto& [metric, value] : numbers_of(result)) group->second[metric].push_back(value);
+    for (const auto& [metric, value] : numbers_of(cell)) group->second[metric].push_back(value);
   }
-  std::string text = "camera,trajectory,method";
-  if (!cells.empty())
-    for (const Setting& axis : cells.front().cell.settings) text += "," + csv_field(axis.path);
-  text += ",metric,mean,half_width_95,seeds\n";
+  std::string text = row_start_names(axes) + ",metric,mean,half_width_95,seeds\n";
   for (const std::string& key : order)
     for (const auto& [metric, values] : groups.at(key)) {
       const Repeats r = repeats_of(values);

@@ -10,7 +10,7 @@
 #include "dataset/image_io.h"
 #include "dataset/writer.h"
 #include "studies/html.h"
-#include "studies/paper_numbers.h"
+#include "studies/published.h"
 #include "studies/report_parts.h"
 
 namespace rugae {
@@ -18,8 +18,6 @@ namespace {
 
 using nlohmann::json;
 namespace fs = std::filesystem;
-
-std::string stem(const std::string& name_or_path) { return fs::path(name_or_path).stem().string(); }
 
 // Fills {{name}} in the template; every name must be there, and every placeholder be filled.
 std::string filled(std::string page, const std::map<std::string, std::string>& values,
@@ -45,30 +43,36 @@ std::string counted(std::size_t n, const std::string& one, const std::string& ma
   return fmt::format("{} {}", n, n == 1 ? one : many.empty() ? one + "s" : many);
 }
 
-std::string lede(const ReportInput& input, const CellView& first) {
+std::string lede(const std::vector<StudyPart>& parts, const CellView& first) {
   const Lens& lens = first.truth.camera().lens;
-  const SimulateOptions& simulate = input.study.variants.front().simulate;
+  const StudyOptions& study = parts.front().options;
+  const SimulateOptions& simulate = study.variants.front().simulate;
   const std::string scene = html::escape(stem(simulate.scene));
-  if (input.cells.size() == 1)
+  const std::size_t cells = all_cells(parts).size();
+  if (cells == 1)
     return fmt::format(
         "{} frames of {} &times; {} px from a capsule camera (<b>{}</b>) on <b>trajectory {}</b>, "
         "{} cm through a simulated stomach (<b>{}</b>, {}, seed {}). The <b>{}</b> method "
         "reconstructed the path and the wall from the frames alone; here both are measured against "
         "the exact truth.",
         first.truth.size(), lens.width, lens.height,
-        html::escape(paper_camera(stem(first.cell.cell.camera))),
+        html::escape(published_camera(stem(first.cell.cell.camera))),
         html::escape(stem(first.cell.cell.trajectory)),
         html::number(length_mm(first.truth.track()) / 10.0, 4), scene,
         html::escape(simulate.resolution), first.cell.cell.seed,
         html::escape(first.cell.cell.method));
+  if (parts.size() > 1)
+    return fmt::format(
+        "{} cells in {} parts in a simulated stomach (<b>{}</b>, {}), each measured against the "
+        "exact truth that its method never saw.",
+        cells, parts.size(), scene, html::escape(simulate.resolution));
   return fmt::format(
       "{} cells: every combination of {}, {}, {}, {} and {} in a simulated stomach (<b>{}</b>, "
-      "{}), "
-      "each reconstructed from its frames alone and measured against the exact truth.",
-      input.cells.size(), counted(input.study.cameras.size(), "camera"),
-      counted(input.study.trajectories.size(), "trajectory", "trajectories"),
-      counted(input.study.variants.size(), "setting"), counted(input.study.seeds.size(), "seed"),
-      counted(input.study.methods.size(), "method"), scene, html::escape(simulate.resolution));
+      "{}), each reconstructed from its frames alone and measured against the exact truth.",
+      cells, counted(study.cameras.size(), "camera"),
+      counted(study.trajectories.size(), "trajectory", "trajectories"),
+      counted(study.variants.size(), "setting"), counted(study.seeds.size(), "seed"),
+      counted(study.methods.size(), "method"), scene, html::escape(simulate.resolution));
 }
 
 std::string gates_part(const std::vector<GateOutcome>& gates) {
@@ -94,20 +98,19 @@ std::string overview_part(const std::vector<CellResult>& cells) {
       const json& value = metric_at(cell.metrics, path);
       return value.is_number() ? value.get<double>() : std::nan("");
     };
-    const PaperNumbers paper = paper_numbers(cell.cell.camera, cell.cell.trajectory);
-    const auto of_paper = [](const std::optional<double>& v) {
+    const auto of_paper = [&](const std::string& table) {
+      const auto v = published(table, cell.cell.trajectory, cell.cell.camera);
       return "<small>" + (v ? html::number(*v) : std::string("&ndash;")) + "</small>";
     };
-    table.rows.push_back(
-        {fmt::format("<a href=\"#{}\">{}</a>", html::escape(cell.cell.name()),
-                     html::escape(paper_camera(stem(cell.cell.camera)))),
-         html::escape(stem(cell.cell.trajectory)),
-         html::escape(cell.cell.method) + "<br><small>" + html::escape(cell.cell.setting()) +
-             "</small>",
-         html::number(at("trajectory.ate_sim3_rmse_mm")), of_paper(paper.ate_rmse_mm),
-         html::number(at("surface.icp_aligned.accuracy_mean_mm")), of_paper(paper.map_mean_mm),
-         html::number(100.0 * at("tracking.tracked_share")) + " %",
-         html::number(at("time.reconstruct_s"))});
+    table.rows.push_back({fmt::format("<a href=\"#{}\">{}</a>", html::escape(cell.cell.name()),
+                                      html::escape(published_camera(stem(cell.cell.camera)))),
+                          html::escape(stem(cell.cell.trajectory)),
+                          html::escape(cell.cell.method) + "<br><small>" +
+                              html::escape(cell.cell.setting()) + "</small>",
+                          html::number(at("trajectory.ate_sim3_rmse_mm")), of_paper("ate"),
+                          html::number(at("surface.icp_aligned.accuracy_mean_mm")), of_paper("map"),
+                          html::number(100.0 * at("tracking.tracked_share")) + " %",
+                          html::number(at("time.reconstruct_s"))});
   }
   std::string sheet = "<div class=\"sheet\">";
   for (const CellResult& cell : cells) {
@@ -117,7 +120,7 @@ std::string overview_part(const std::vector<CellResult>& cells) {
         "<a href=\"#{0}\"><img loading=\"lazy\" src=\"{1}\" alt=\"{0}, frame {2}\"><span>{3}, "
         "{4}</span></a>",
         html::escape(cell.cell.name()), html::jpeg(read_image_bgr(layout.frame(frame)), 300), frame,
-        html::escape(paper_camera(stem(cell.cell.camera))),
+        html::escape(published_camera(stem(cell.cell.camera))),
         html::escape(stem(cell.cell.trajectory)));
   }
   return "<section class=\"chapter\"><h2>All cells</h2>" + sheet + "</div>" + table.str() +
@@ -149,40 +152,59 @@ std::string cell_chapters(const CellView& view) {
          chapter("All numbers", "Dashes stand for what could not be measured.", tables_part(view));
 }
 
-std::string cells_part(const ReportInput& input, std::string& head_cards, std::string& cover,
-                       std::string& lede_text) {
+// The chapters of all cells that the study wants shown; those of a single one without a fold.
+std::string cells_part(const std::vector<StudyPart>& parts, std::string& head_cards,
+                       std::string& cover, std::string& lede_text) {
   std::string out;
-  const bool many = input.cells.size() > 1;
-  for (const CellResult& cell : input.cells) {
-    const Truth truth = Truth::open(cell.dataset);
-    const bool failed = cell.metrics.contains("failed");
-    const Estimate estimate = failed ? Estimate{} : read_estimate(cell.estimate);
-    const CellView view{cell, truth, estimate, many};
-    if (out.empty()) {
-      cover = cover_picture(view);
-      lede_text = lede(input, view);
-      if (!many) head_cards = headline_cards(view);
+  const bool many = all_cells(parts).size() > 1;
+  for (const StudyPart& part : parts)
+    for (const CellResult& cell : part.cells) {
+      const bool first = lede_text.empty();
+      if (!part.options.details && !first) continue;
+      const Truth truth = Truth::open(cell.dataset);
+      const bool failed = cell.metrics.contains("failed");
+      const Estimate estimate = failed ? Estimate{} : read_estimate(cell.estimate);
+      const CellView view{cell, truth, estimate, many};
+      if (first) {
+        cover = cover_picture(view);
+        lede_text = lede(parts, view);
+        if (!many) head_cards = headline_cards(view);
+      }
+      if (!part.options.details) continue;
+      if (!many) return cell_chapters(view);
+      out += fmt::format("<details class=\"cell\" id=\"{}\"><summary>{}</summary>\n",
+                         html::escape(cell.cell.name()), html::escape(cell.cell.title())) +
+             headline_cards(view) + cell_chapters(view) + "</details>\n";
     }
-    if (!many) return cell_chapters(view);
-    out += fmt::format("<details class=\"cell\" id=\"{}\"><summary>{}</summary>\n",
-                       html::escape(cell.cell.name()), html::escape(cell.cell.title())) +
-           headline_cards(view) + cell_chapters(view) + "</details>\n";
-  }
+  return out;
+}
+
+std::string summaries_part(const std::vector<StudyPart>& parts) {
+  std::string out;
+  for (const StudyPart& part : parts)
+    if (const std::string body = summary_part(part.summary); !body.empty())
+      out += chapter(html::escape(part.options.title), "", body);
   return out;
 }
 
 }  // namespace
 
-std::string report_html(const ReportInput& input) {
-  check(!input.cells.empty(), "report: a study without cells");
+std::string report_html(const Study& study, const std::vector<StudyPart>& parts) {
+  const std::vector<CellResult> cells = all_cells(parts);
+  check(!cells.empty(), "report: a study without cells");
   const fs::path file = preset_root() / "viewer" / "report.html";
   const std::string page = read_text(file);
   std::map<std::string, std::string> values;
-  values["title"] = html::escape(input.study.title);
-  values["cells"] = cells_part(input, values["cards"], values["cover"], values["lede"]);
-  values["overview"] = input.cells.size() > 1 ? overview_part(input.cells) : "";
-  values["gates"] = gates_part(input.gates);
-  values["study"] = html::escape(input.study_text);
+  values["title"] = html::escape(study.title);
+  values["cells"] = cells_part(parts, values["cards"], values["cover"], values["lede"]);
+  values["summaries"] = summaries_part(parts);
+  values["overview"] = cells.size() > 1 ? overview_part(cells) : "";
+  values["gates"] = gates_part(all_gates(parts));
+  std::string texts = study.text;
+  if (parts.size() > 1)
+    for (const StudyPart& part : parts)
+      texts += "\n# " + part.options.name + "\n" + part.options.text;
+  values["study"] = html::escape(texts);
   return filled(page, values, file);
 }
 

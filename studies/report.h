@@ -4,21 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "studies/cell.h"
-#include "studies/gates.h"
-#include "studies/study_file.h"
+#include "studies/study_part.h"
 
 namespace rugae {
 
-struct ReportInput {
-  const StudyOptions& study;
-  const std::string& study_text;
-  const std::vector<CellResult>& cells;
-  const std::vector<GateOutcome>& gates;
-};
-
 /// The template viewer/report.html (under preset_root()) with the study's pictures, plots and
 /// tables filled in. Reads the datasets and estimates of the cells.
-std::string report_html(const ReportInput& input);
+std::string report_html(const Study& study, const std::vector<StudyPart>& parts);
 
 }  // namespace rugae

@@ -7,6 +7,7 @@
 #include "dataset/estimate.h"
 #include "dataset/truth.h"
 #include "studies/cell.h"
+#include "studies/summary.h"
 
 namespace rugae {
 
@@ -30,6 +31,9 @@ std::string path_part(const CellView& view);
 std::string map_part(const CellView& view);
 /// Every metric.
 std::string tables_part(const CellView& view);
+
+/// Tables with the published numbers beside ours, findings, curves and bars; empty without any.
+std::string summary_part(const Summary& summary);
 
 /// A frame of the dataset for the head of the page, as data URI.
 std::string cover_picture(const CellView& view);

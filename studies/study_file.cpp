@@ -18,17 +18,15 @@ void read_where(YamlReader& gate, const std::vector<Axis>& axes, std::vector<Set
   auto where = gate.child("where");
   if (!where) return;
   for (const std::string& path : where->keys()) {
-    Setting setting{path, {}};
-    where->get(path, setting.value);
+    const Setting setting{path, where->text(path)};
     std::vector<std::string> paths;
     for (const Axis& axis : axes) paths.push_back(axis.path);
     const auto axis = std::ranges::find(axes, path, &Axis::path);
     check(axis != axes.end(), "{}: '{}' is no axis of the study{}", where->where(path), path,
           did_you_mean(path, paths));
-    check(std::ranges::count(axis->values, setting.value) > 0,
-          "{}: {} is no value of the axis '{}': {}", where->where(path), setting.value, path,
-          fmt::join(axis->values, ", "));
-    settings.push_back(std::move(setting));
+    check(std::ranges::count(axis->values, setting) > 0, "{}: {} is no value of the axis '{}': {}",
+          where->where(path), setting.value, path, fmt::join(axis->names(), ", "));
+    settings.push_back(setting);
   }
 }
 
@@ -65,54 +63,6 @@ void read_names(YamlReader& yaml, const std::string& key, const std::string& wha
     } catch (const Error& error) {
       fail("{}: {}", yaml.where(key), error.what());
     }
-  }
-}
-
-// All that is not read elsewhere, as one variant.
-Variant read_variant(YamlReader& yaml) {
-  Variant variant;
-  yaml.get("scene", variant.simulate.scene);
-  yaml.get("resolution", variant.simulate.resolution);
-  yaml.get("frames", variant.simulate.frames);
-  if (auto render = yaml.child("render")) read_settings(*render, variant.simulate.render);
-  check(variant.simulate.frames >= 0, "{}: frames is {}, expected at least 0 (0: as in the paper)",
-        yaml.where("frames"), variant.simulate.frames);
-  if (auto recon = yaml.child("recon")) read_options(*recon, variant.recon);
-  variant.simulate.check();
-  return variant;
-}
-
-// The file with these settings in it: an axis can set whatever the file can.
-Variant with_settings(const std::string& text, const std::vector<Setting>& settings) {
-  std::string changed = text;
-  for (const Setting& s : settings) changed = yaml_with(changed, s.path, s.value);
-  constexpr const char* kName = "changed";
-  try {
-    YamlReader yaml = YamlReader::from_text(changed, kName);
-    Variant variant = read_variant(yaml);
-    variant.settings = settings;
-    return variant;
-  } catch (const Error& error) {
-    // Without the place, which is one in the changed text.
-    const std::string what = error.what();
-    fail("{}", what.starts_with(kName) ? what.substr(what.find(": ") + 2) : what);
-  }
-}
-
-Variant read_variant_with(const std::string& text, const std::vector<Axis>& axes,
-                          const std::vector<Setting>& settings) {
-  try {
-    return with_settings(text, settings);
-  } catch (const Error& error) {
-    // The axis that is wrong alone, or all of them together.
-    for (std::size_t i = 0; i < axes.size(); ++i) {
-      try {
-        with_settings(text, {settings[i]});
-      } catch (const Error& alone) {
-        fail("{}: axis {}: {}", axes[i].where, shown({settings[i]}), alone.what());
-      }
-    }
-    fail("{}: axes {}: {}", axes.front().where, shown(settings), error.what());
   }
 }
 
@@ -179,11 +129,13 @@ const ExternalMethod* StudyOptions::command_of(const std::string& method) const 
   return at == commands.end() ? nullptr : &*at;
 }
 
-StudyOptions read_study_text(const std::string& text, const std::string& name) {
+StudyOptions read_part_text(const std::string& text, const std::string& name) {
   YamlReader yaml = YamlReader::from_text(text, name);
   StudyOptions study;
+  study.text = text;
   yaml.get("title", study.title);
-  const Variant base = read_variant(yaml);
+  yaml.get("details", study.details);
+  const Variant base = read_variant(yaml, name);
   read_names(yaml, "cameras", "camera", study.cameras);
   read_names(yaml, "trajectories", "trajectory", study.trajectories);
   read_seeds(yaml, study.seeds);
@@ -191,15 +143,10 @@ StudyOptions read_study_text(const std::string& text, const std::string& name) {
   read_methods(yaml, base.recon, study);
   const std::vector<Axis> axes = read_axes(yaml);
   for (YamlReader& gate : yaml.children("gates")) study.gates.push_back(read_gate(gate, axes));
+  study.summaries = read_summaries(yaml, axes);
   yaml.finish();
-  study.variants.clear();
-  for (const auto& settings : combinations(axes))
-    study.variants.push_back(settings.empty() ? base : read_variant_with(text, axes, settings));
+  study.variants = read_variants(text, name, axes);
   return study;
-}
-
-StudyOptions read_study(const std::filesystem::path& file) {
-  return read_study_text(read_text(file), file.string());
 }
 
 }  // namespace rugae

@@ -6,19 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "recon/options.h"
-#include "render/simulate.h"
-#include "studies/axes.h"
 #include "studies/external.h"
+#include "studies/summary_spec.h"
+#include "studies/variant.h"
 
 namespace rugae {
-
-/// What a cell runs with: one combination of the study's axes.
-struct Variant {
-  std::vector<Setting> settings;  // empty where there are no axes
-  SimulateOptions simulate;       // camera, trajectory and seed are those of the cell
-  ReconOptions recon;             // method and seed likewise
-};
 
 /// A bound on a metric, for every cell it names (all, where it names nothing).
 struct Gate {
@@ -32,22 +24,36 @@ struct Gate {
 /// Keys of the file have the same names; `frames`, `scene`, `resolution` and `render` go to
 /// `simulate`.
 struct StudyOptions {
+  std::string name;  // of a part: the stem of its file; empty for a study without parts
   std::string title = "A stomach, simulated and reconstructed";
   std::vector<std::string> cameras, trajectories, methods{"paper"};
   std::vector<ExternalMethod> commands;  // methods that are programs of their own
   std::vector<std::uint64_t> seeds{1};   // each draws the stomach, the paths and the noise anew
   std::vector<Variant> variants{1};      // at least one
   std::vector<Gate> gates;
+  SummarySpecs summaries;
+  bool details = true;  // of each cell in the report, not its row in the tables alone
+  std::string text;     // as it was read
 
   /// Null for a method of ours.
   const ExternalMethod* command_of(const std::string& method) const;
 };
 
-/// Reads a study file; throws Error with file, line and column for an unknown key, a wrong type,
-/// a value out of range, a preset that does not exist, a gate without a bound or a reason, or an
-/// axis whose path or value the file itself could not hold.
-StudyOptions read_study(const std::filesystem::path& file);
+/// A study, or several that make one report.
+struct Study {
+  std::string title;
+  std::string text;  // of the file
+  std::vector<StudyOptions> parts;
+};
+
+/// Reads a study file: one study, or with the key `parts` a list of other files or presets, each
+/// with changes of its own. Throws Error with file, line and column for an unknown key, a wrong
+/// type, a value out of range, a preset that does not exist, a gate without a bound or a reason, or
+/// an axis whose path or value the file itself could not hold.
+Study read_study(const std::filesystem::path& file);
 /// The same from text; `name` stands for the file in errors.
-StudyOptions read_study_text(const std::string& text, const std::string& name);
+Study read_study_text(const std::string& text, const std::string& name);
+/// A study without parts.
+StudyOptions read_part_text(const std::string& text, const std::string& name);
 
 }  // namespace rugae

@@ -55,34 +55,62 @@ std::string csv_field(const std::string& text) {
   return out + "\"";
 }
 
-json results_json(const StudyOptions& study, const std::string& study_text,
-                  const std::vector<CellResult>& cells, const std::vector<GateOutcome>& gates) {
-  json list = json::array(), held = json::array();
+std::vector<std::string> axis_paths(const std::vector<CellResult>& cells) {
+  std::vector<std::string> paths;
   for (const CellResult& cell : cells)
-    list.push_back({{"camera", cell.cell.camera},
-                    {"trajectory", cell.cell.trajectory},
-                    {"method", cell.cell.method},
-                    {"axes", settings_json(cell.cell.settings)},
-                    {"seed", cell.cell.seed},
-                    {"dataset", cell.dataset.filename().string()},
-                    {"estimate", cell.estimate.filename().string()},
-                    {"metrics", lasting(cell.metrics)}});
-  for (const GateOutcome& gate : gates)
+    for (const Setting& axis : cell.cell.settings)
+      if (std::ranges::count(paths, axis.path) == 0) paths.push_back(axis.path);
+  return paths;
+}
+
+std::string row_start_names(const std::vector<std::string>& axes) {
+  std::string text = "part,camera,trajectory,method";
+  for (const std::string& axis : axes) text += "," + csv_field(axis);
+  return text;
+}
+
+std::string row_start(const Cell& cell, const std::vector<std::string>& axes) {
+  std::string text = fmt::format("{},{},{},{}", csv_field(cell.part), csv_field(cell.camera),
+                                 csv_field(cell.trajectory), csv_field(cell.method));
+  for (const std::string& axis : axes) text += "," + csv_field(value_of(cell, axis));
+  return text;
+}
+
+json results_json(const Study& study, const std::vector<StudyPart>& parts) {
+  json list = json::array(), held = json::array(), texts = json::array();
+  json summaries = json::object();
+  for (const StudyPart& part : parts) {
+    for (const CellResult& cell : part.cells)
+      list.push_back({{"part", cell.cell.part},
+                      {"camera", cell.cell.camera},
+                      {"trajectory", cell.cell.trajectory},
+                      {"method", cell.cell.method},
+                      {"axes", settings_json(cell.cell.settings)},
+                      {"seed", cell.cell.seed},
+                      {"dataset", cell.dataset.filename().string()},
+                      {"estimate", cell.estimate.filename().string()},
+                      {"metrics", lasting(cell.metrics)}});
+    summaries[part.options.name] = to_json(part.summary);
+    texts.push_back(part.options.text);
+  }
+  for (const GateOutcome& gate : all_gates(parts))
     held.push_back({{"cell", gate.cell},
                     {"metric", gate.metric},
                     {"expected", gate.expected},
                     {"found", gate.found},
                     {"reason", gate.reason},
                     {"passed", gate.passed}});
-  return {{"title", study.title}, {"study", study_text}, {"cells", list}, {"gates", held}};
+  return {{"title", study.title}, {"study", study.text}, {"parts", texts},
+          {"cells", list},        {"gates", held},       {"summaries", summaries}};
 }
 
-json times_json(const std::vector<CellResult>& cells) {
+json times_json(const std::vector<StudyPart>& parts) {
   json list = json::array();
-  for (const CellResult& cell : cells)
-    list.push_back({{"cell", cell.cell.title()},
-                    {"time", cell.metrics.value("time", json())},
-                    {"simulation", cell.metrics.value("simulation", json())}});
+  for (const StudyPart& part : parts)
+    for (const CellResult& cell : part.cells)
+      list.push_back({{"cell", cell.cell.title()},
+                      {"time", cell.metrics.value("time", json())},
+                      {"simulation", cell.metrics.value("simulation", json())}});
   return {{"cells", list}};
 }
 
@@ -93,18 +121,12 @@ std::string table_csv(const std::vector<CellResult>& cells) {
     rows.push_back(numbers_of(cell));
     for (const auto& [path, value] : rows.back()) metrics.insert(path);
   }
-  std::string text = "camera,trajectory,method";
-  if (!cells.empty())
-    for (const Setting& axis : cells.front().cell.settings) text += "," + csv_field(axis.path);
-  text += ",seed";
+  const std::vector<std::string> axes = axis_paths(cells);
+  std::string text = row_start_names(axes) + ",seed";
   for (const std::string& metric : metrics) text += "," + csv_field(metric);
   text += "\n";
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    const Cell& cell = cells[i].cell;
-    text += fmt::format("{},{},{}", csv_field(cell.camera), csv_field(cell.trajectory),
-                        csv_field(cell.method));
-    for (const Setting& axis : cell.settings) text += "," + csv_field(axis.value);
-    text += fmt::format(",{}", cell.seed);
+    text += fmt::format("{},{}", row_start(cells[i].cell, axes), cells[i].cell.seed);
     for (const std::string& metric : metrics) {
       const auto at = rows[i].find(metric);
       text += at == rows[i].end() ? "," : fmt::format(",{}", at->second);

@@ -54,7 +54,7 @@ class External : public TemporaryFolder {
 
   json metrics_of(const fs::path& study) {
     Progress progress(Progress::Output::silent);
-    run_study(study, folder_ / "out", progress);
+    run_study(study, folder_ / "out", {}, progress);
     return json::parse(read_text(folder_ / "out" / "results.json")).at("cells").at(0).at("metrics");
   }
 

@@ -46,22 +46,23 @@ CellResult cell(int variant, std::uint64_t seed, double ate_mm) {
 TEST(Repeats, SeedsOfASettingAreOneRow) {
   const std::string csv = repeats_csv({cell(0, 1, 1.0), cell(0, 2, 3.0), cell(1, 1, 5.0)});
   EXPECT_EQ(csv.substr(0, csv.find('\n')),
-            "camera,trajectory,method,frames,metric,mean,half_width_95,seeds");
-  EXPECT_NE(csv.find("\ncam,1,paper,12,trajectory.ate_mm,2,12.7062"), std::string::npos) << csv;
-  EXPECT_NE(csv.find("\ncam,1,paper,24,trajectory.ate_mm,5,,1\n"), std::string::npos) << csv;
+            "part,camera,trajectory,method,frames,metric,mean,half_width_95,seeds");
+  EXPECT_NE(csv.find("\n,cam,1,paper,12,trajectory.ate_mm,2,12.7062"), std::string::npos) << csv;
+  EXPECT_NE(csv.find("\n,cam,1,paper,24,trajectory.ate_mm,5,,1\n"), std::string::npos) << csv;
   EXPECT_EQ(csv.find("seconds"), std::string::npos);
 }
 
 // What another run would measure otherwise is in times.json alone.
 TEST(Tables, ResultsHoldNoTimes) {
-  StudyOptions study;
+  const Study study{"Title", "", std::vector<StudyOptions>(1)};
   const std::vector<CellResult> cells = {cell(0, 1, 1.0)};
-  EXPECT_EQ(results_json(study, "", cells, {}).dump().find("seconds"), std::string::npos);
+  const std::vector<StudyPart> parts = {{study.parts[0], cells, {}, {}}};
+  EXPECT_EQ(results_json(study, parts).dump().find("seconds"), std::string::npos);
   EXPECT_EQ(table_csv(cells),
-            "camera,trajectory,method,frames,seed,simulation.frames,trajectory.ate_mm\n"
-            "cam,1,paper,12,1,12,1\n");
-  EXPECT_EQ(times_json(cells).at("cells").at(0).at("time").at("seconds"), 3.0);
-  EXPECT_EQ(times_json(cells).at("cells").at(0).at("simulation").at("seconds"), 4.0);
+            "part,camera,trajectory,method,frames,seed,simulation.frames,trajectory.ate_mm\n"
+            ",cam,1,paper,12,1,12,1\n");
+  EXPECT_EQ(times_json(parts).at("cells").at(0).at("time").at("seconds"), 3.0);
+  EXPECT_EQ(times_json(parts).at("cells").at(0).at("simulation").at("seconds"), 4.0);
 }
 
 TEST(JUnit, AFailedGateIsAFailedTest) {

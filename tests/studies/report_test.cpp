@@ -43,8 +43,10 @@ class Report : public TemporaryFolder {
       std::filesystem::create_directories(pictures / stage);
       write_image(pictures / stage / "000000.png", cv::Mat(20, 30, CV_8UC3, cv::Scalar(1, 2, 3)));
     }
-    StudyOptions study;
+    Study study;
     study.title = "Title & <more>";
+    study.text = "cameras: [a]\n";
+    study.parts.resize(1);
     CellResult cell;
     cell.cell = {"misumi-v5506", "1", "paper"};
     cell.dataset = folder_ / "data";
@@ -52,8 +54,7 @@ class Report : public TemporaryFolder {
     Progress progress(Progress::Output::silent);
     cell.metrics = evaluate(cell.dataset, cell.estimate, progress);
     cell.metrics["simulation"] = {{"frames_per_s", 12.0}, {"frames", 12}};
-    const std::string text = "cameras: [a]\n";
-    return report_html({study, text, {cell}, {}});
+    return report_html(study, {{study.parts[0], {cell}, {}, {}}});
   }
 };
 
@@ -121,9 +122,10 @@ TEST(Tables, CsvHasARowACellAndEmptyPlacesWhereNothingWasMeasured) {
   a.metrics = {{"x", {{"y_mm", 1.5}, {"z_mm", nullptr}}}, {"frames", {{"time_s", {1, 2}}}}};
   b.cell = {"cam,2", "1", "paper"};
   b.metrics = {{"x", {{"y_mm", 2.5}, {"z_mm", 3.0}}}};
-  EXPECT_EQ(table_csv({a, b}),
-            "camera,trajectory,method,seed,x.y_mm,x.z_mm\ncam,1,paper,1,1.5,\n\"cam,2\",1,paper,1,"
-            "2.5,3\n");
+  EXPECT_EQ(
+      table_csv({a, b}),
+      "part,camera,trajectory,method,seed,x.y_mm,x.z_mm\n,cam,1,paper,1,1.5,\n,\"cam,2\",1,paper,1,"
+      "2.5,3\n");
 }
 
 }  // namespace

@@ -23,11 +23,11 @@ std::string error_of(const std::string& text) {
 
 TEST(StudyFile, ReadsWhatItSays) {
   const StudyOptions study =
-      read_study_text(kHead +
-                          "title: A title\nframes: 30\nseed: 7\nrender: {sensor: {noise: "
-                          "false}}\nresolution: coarse\n"
-                          "gates: [{metric: tracking.tracked_share, above: 0.5, reason: why}]\n",
-                      "study.yaml");
+      read_part_text(kHead +
+                         "title: A title\nframes: 30\nseed: 7\nrender: {sensor: {noise: "
+                         "false}}\nresolution: coarse\n"
+                         "gates: [{metric: tracking.tracked_share, above: 0.5, reason: why}]\n",
+                     "study.yaml");
   EXPECT_EQ(study.title, "A title");
   ASSERT_EQ(study.variants.size(), 1u);
   const SimulateOptions& simulate = study.variants[0].simulate;
@@ -70,13 +70,14 @@ TEST(StudyFile, NegativeFramesAreRefused) {
 TEST(StudyFile, EveryPresetReads) {
   for (const std::string& name : preset_names("studies")) {
     SCOPED_TRACE(name);
-    EXPECT_FALSE(cells_of(read_study(find_preset("studies", "study", name))).empty());
+    for (const StudyOptions& part : read_study(find_preset("studies", "study", name)).parts)
+      EXPECT_FALSE(cells_of(part).empty());
   }
 }
 
 // Axes reach every setting of the file, by its path; the file's own value stands elsewhere.
 TEST(StudyFile, AxesMakeEveryCombination) {
-  const StudyOptions study = read_study_text(
+  const StudyOptions study = read_part_text(
       "cameras: [misumi-v5506]\ntrajectories: [\"1\"]\nseeds: [3, 5]\n"
       "recon: {keyframes: {max_gap: 7}}\n"
       "axes:\n  recon.preprocess.undistort: [true, false]\n  render.sensor.noise: [false]\n"
@@ -118,7 +119,8 @@ TEST(StudyFile, ABadAxisIsNamedWithItsPlace) {
       "their own");
   EXPECT_EQ(error_of(axes("rendr.sensor.noise: [true]")),
             "study.yaml:3:28: axis 'rendr.sensor.noise': no such setting, expected one of: render, "
-            "recon, scene, resolution, frames; did you mean 'render'?");
+            "recon, scene, resolution, frames, calibrate, lens_error, replace; did you mean "
+            "'render'?");
   EXPECT_EQ(error_of(kHead + "seeds: [1, 2, 1]\n"), "study.yaml:3:8: seed 1 stands twice");
   EXPECT_EQ(error_of(kHead + "seed: 1\nseeds: [2]\n"),
             "study.yaml:4:8: seed and seeds, expected one of them");
@@ -129,13 +131,103 @@ TEST(StudyFile, AGateCanHoldForSomeOfTheAxes) {
   const auto gate = [&](const std::string& where) {
     return head + "gates: [{metric: a.b, below: 1, reason: why, where: {" + where + "}}]\n";
   };
-  const StudyOptions study = read_study_text(gate("frames: 24"), "study.yaml");
+  const StudyOptions study = read_part_text(gate("frames: 24"), "study.yaml");
   ASSERT_EQ(study.gates.size(), 1u);
   EXPECT_EQ(study.gates[0].settings, (std::vector<Setting>{{"frames", "24"}}));
   EXPECT_EQ(error_of(gate("frames: 25")),
             "study.yaml:4:62: 25 is no value of the axis 'frames': 12, 24");
   EXPECT_EQ(error_of(gate("frame: 24")),
             "study.yaml:4:61: 'frame' is no axis of the study; did you mean 'frames'?");
+}
+
+// A name of its own makes an axis of bundles; a mapping for the scene builds on the one that is
+// named; a value may be a list or a mapping.
+TEST(StudyFile, AxesOfBundlesAndOfTheScene) {
+  const StudyOptions study = read_part_text(
+      "cameras: [misumi-v5506]\ntrajectories: [\"1\"]\n"
+      "axes:\n"
+      "  preprocessing:\n"
+      "    none: {recon.preprocess.undistort: false, recon.preprocess.devignette: false}\n"
+      "    all: {}\n"
+      "  scene.mucosa.wetness: [0.1, 0.9]\n",
+      "study.yaml");
+  ASSERT_EQ(study.variants.size(), 4u);
+  EXPECT_FALSE(study.variants[0].recon.preprocess.undistort);
+  EXPECT_FALSE(study.variants[1].recon.preprocess.devignette);
+  EXPECT_TRUE(study.variants[2].recon.preprocess.undistort);
+  EXPECT_EQ(study.variants[0].simulate.scene, "stomach");
+  EXPECT_NE(study.variants[0].scene_text.find("wetness: 0.1"), std::string::npos)
+      << study.variants[0].scene_text;
+  EXPECT_NE(study.variants[3].scene_text.find("wetness: 0.9"), std::string::npos);
+  const auto cells = cells_of(study);
+  EXPECT_EQ(cells[1].title(),
+            "misumi-v5506, trajectory 1, paper, preprocessing=none, scene.mucosa.wetness=0.9");
+
+  const auto axes = [](const std::string& text) { return kHead + "axes: {" + text + "}\n"; };
+  EXPECT_EQ(error_of(axes("scene.mucosa.wetnes: [0.1]")),
+            "study.yaml:3:29: axis scene.mucosa.wetnes=0.1: unknown key 'wetnes'; did you mean "
+            "'wetness'?");
+  EXPECT_EQ(
+      error_of(axes("steps: {a: {recn.undistort: true}}")),
+      "study.yaml:3:36: axis 'recn.undistort': no such setting, expected one of: render, "
+      "recon, scene, resolution, frames, calibrate, lens_error, replace; did you mean 'recon'?");
+  EXPECT_EQ(error_of(axes("recon.map.voxel_share: {a: 0.1}")),
+            "study.yaml:3:31: axis 'recon.map.voxel_share' is a mapping, expected a list of its "
+            "values; only an axis with a name of its own has names for its values");
+  EXPECT_EQ(error_of(kHead + "scene: {like: stomach, mucossa: {}}\n"),
+            "study.yaml:3:8: unknown key 'mucossa'; did you mean 'mucosa'?");
+}
+
+TEST(StudyFile, SummariesNameWhatCellsDifferIn) {
+  const std::string head = kHead + "axes: {frames: [12, 24], steps: {a: {}, b: {frames: 9}}}\n";
+  const auto table = [&](const std::string& more) {
+    return head + "tables: [{title: T, metric: a.b, " + more + "}]\n";
+  };
+  EXPECT_EQ(error_of(table("rows: steps, columns: frames, published: ate")), "no error");
+  EXPECT_EQ(error_of(table("rows: step")),
+            "study.yaml:4:40: rows is 'step', expected one of: camera, trajectory, method, seed, "
+            "frames, steps; did you mean 'steps'?");
+  EXPECT_EQ(
+      error_of(table("published: at")),
+      "study.yaml:4:45: published is 'at', expected one of: ate, ate_preprocessing, features, "
+      "map, map_preprocessing, time, time_of_pair; did you mean 'ate'?");
+  EXPECT_EQ(error_of(head + "curves: [{title: T, metric: a.b, over: steps}]\n"),
+            "study.yaml:4:40: the axis 'steps' has the value 'a', expected numbers");
+  EXPECT_EQ(error_of(head + "bars: [{title: T, metric: a.b, over: camera}]\n"),
+            "study.yaml:4:38: over is 'camera', expected an axis of the study");
+  EXPECT_EQ(error_of(head + "findings: [{claim: C, metric: a.b, more: {steps: c}, less: {steps: "
+                            "a}}]\n"),
+            "study.yaml:4:50: 'c' is no value of the axis 'steps': a, b");
+  EXPECT_EQ(error_of(head + "findings: [{claim: C, metric: a.b, more: {steps: a}, less: {frames: "
+                            "12}}]\n"),
+            "study.yaml:4:60: less is of 'frames' and more of 'steps', expected one");
+}
+
+// Parts are studies of their own, each with changes.
+TEST(StudyFile, PartsAreOtherStudies) {
+  const std::string parts =
+      "title: Two\nparts:\n  - {study: demo, with: {frames: 12, cameras: [misumi-v5506, "
+      "awaiba-naneye], gates: []}}\n  - {study: trajectories, name: six}\n";
+  const Study study = read_study_text(parts, "study.yaml");
+  EXPECT_EQ(study.title, "Two");
+  ASSERT_EQ(study.parts.size(), 2u);
+  EXPECT_EQ(study.parts[0].variants[0].simulate.frames, 12);
+  EXPECT_TRUE(study.parts[0].gates.empty());
+  EXPECT_EQ(cells_of(study.parts[0]).size(), 2u);
+  EXPECT_EQ(cells_of(study.parts[0])[1].name(), "demo_awaiba-naneye_inspection_paper");
+  EXPECT_EQ(cells_of(study.parts[1]).front().part, "six");
+
+  EXPECT_EQ(error_of("title: T\nparts: [{study: demoo}]\n").substr(0, 49),
+            "study.yaml:2:17: study 'demoo': no such preset; d");
+  EXPECT_EQ(error_of("title: T\nparts: [{study: demo}, {study: demo}]\n"),
+            "study.yaml:2:32: two parts have the name 'demo'; give one another `name`");
+  EXPECT_EQ(error_of("title: T\nparts: []\n"),
+            "study.yaml:2:8: parts is empty, expected at least one");
+  EXPECT_EQ(error_of("title: T\nframes: 3\nparts: [{study: demo}]\n"),
+            "study.yaml:2:1: unknown key 'frames'");
+  const std::string wrong = error_of("title: T\nparts: [{study: demo, with: {frame: 3}}]\n");
+  EXPECT_TRUE(wrong.starts_with("study.yaml:2:29: part 'demo' with its changes: ")) << wrong;
+  EXPECT_NE(wrong.find("unknown key 'frame'; did you mean 'frames'?"), std::string::npos) << wrong;
 }
 
 // The example of docs/studies.md, word for word.
@@ -146,7 +238,7 @@ TEST(StudyFile, TheExampleOfTheDocsReads) {
   ASSERT_NE(begin, std::string::npos);
   const std::string text =
       page.substr(begin + open.size(), page.find("```", begin + open.size()) - begin - open.size());
-  EXPECT_EQ(cells_of(read_study_text(text, "docs/studies.md")).size(), 48u);
+  EXPECT_EQ(cells_of(read_part_text(text, "docs/studies.md")).size(), 48u);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 // A small camera on a short path: the whole loop in seconds.
-class Study : public TemporaryFolder {
+class RunStudy : public TemporaryFolder {
  protected:
   void SetUp() override {
     TemporaryFolder::SetUp();
@@ -42,7 +42,14 @@ class Study : public TemporaryFolder {
 
   StudyResult run(const fs::path& file) {
     Progress progress(Progress::Output::silent);
-    return run_study(file, folder_ / "out", progress);
+    return run_study(file, folder_ / "out", {}, progress);
+  }
+
+  int files_in(const std::string& part) {
+    int count = 0;
+    for ([[maybe_unused]] const auto& entry : fs::directory_iterator(folder_ / "out" / part))
+      ++count;
+    return count;
   }
 
   std::string unchanging() {  // every file below the datasets and estimates, with its time
@@ -58,7 +65,7 @@ class Study : public TemporaryFolder {
   }
 };
 
-TEST_F(Study, RunsTheLoopOnceAndKeepsWhatIsFinished) {
+TEST_F(RunStudy, RunsTheLoopOnceAndKeepsWhatIsFinished) {
   const fs::path file = write_study("");
   const StudyResult first = run(file);
   EXPECT_EQ(first.cells, 1);
@@ -71,7 +78,7 @@ TEST_F(Study, RunsTheLoopOnceAndKeepsWhatIsFinished) {
   EXPECT_EQ(cell.at("metrics").at("tracking").at("frames"), 12);
   EXPECT_EQ(cell.at("metrics").at("simulation").at("frames"), 12);
   EXPECT_TRUE(fs::exists(folder_ / "out" / "datasets" / cell.at("dataset") / "manifest.sha256"));
-  EXPECT_EQ(read_text(folder_ / "out" / "table.csv").rfind("camera,trajectory,method", 0), 0u);
+  EXPECT_EQ(read_text(folder_ / "out" / "table.csv").rfind("part,camera,trajectory,method", 0), 0u);
 
   const std::string before = unchanging();
   run(file);
@@ -99,7 +106,7 @@ TEST_F(Study, RunsTheLoopOnceAndKeepsWhatIsFinished) {
       cell.at("dataset"));
 }
 
-TEST_F(Study, AnUnknownKeyStopsItBeforeAnyWork) {
+TEST_F(RunStudy, AnUnknownKeyStopsItBeforeAnyWork) {
   const fs::path file = write_study("reconn: {}\n");
   try {
     run(file);
@@ -111,7 +118,7 @@ TEST_F(Study, AnUnknownKeyStopsItBeforeAnyWork) {
 }
 
 // Two settings of the reconstruction share their frames; seeds do not.
-TEST_F(Study, CellsShareWhatIsTheSame) {
+TEST_F(RunStudy, CellsShareWhatIsTheSame) {
   const fs::path file = write_study(
       "seeds: [1, 2]\naxes: {recon.keyframes.mean_flow_px: [20, 30]}\n"
       "gates: [{metric: tracking.frames, above: 11, reason: all there, where: "
@@ -134,6 +141,13 @@ TEST_F(Study, CellsShareWhatIsTheSame) {
   EXPECT_NE(
       read_text(folder_ / "out" / "report.html").find("recon.keyframes.mean_flow_px=30, seed 2"),
       std::string::npos);
+  // A setting of the map leaves the motion as it is.
+  EXPECT_EQ(files_in("motions"), 4);
+  run(
+      write_study("seeds: [1, 2]\naxes: {recon.shading.iterations: [3, 5]}\n"
+                  "recon: {keyframes: {mean_flow_px: 20}}\n"));
+  EXPECT_EQ(files_in("motions"), 4);
+  EXPECT_EQ(files_in("estimates"), 8);
 }
 
 }  // namespace

@@ -1,0 +1,118 @@
+#include "studies/cell_files.h"
+
+#include "core/check.h"
+#include "core/files.h"
+#include "core/like.h"
+#include "core/presets.h"
+#include "dataset/layout.h"
+#include "recon/motion.h"
+
+namespace rugae {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+// Raised when the same settings give other results, so that older ones are not taken for new.
+constexpr int kResultsVersion = 2;
+constexpr std::size_t kHashLetters = 10;
+
+// A preset may build on another of its kind, so all of them count, and a file on other files.
+std::string preset_hash(const std::string& kind, const std::string& what,
+                        const std::string& name_or_path) {
+  const fs::path file = find_preset(kind, what, name_or_path);
+  std::string hashes;
+  if (file.extension() == ".yaml" || file.extension() == ".yml")
+    for (const LikeFile& of : read_like_chain(kind, what, file)) hashes += sha256_of_file(of.file);
+  else
+    hashes = sha256_of_file(file);
+  for (const std::string& name : preset_names(kind))
+    hashes += sha256_of_file(find_preset(kind, what, name));
+  return sha256_of_bytes(hashes);
+}
+
+// Everything the dataset is a function of.
+json dataset_key(const Variant& variant, const Cell& cell) {
+  const SimulateOptions& s = variant.simulate;
+  const std::string scene =
+      sha256_of_bytes(preset_hash("scenes", "scene", s.scene) + variant.scene_text);
+  return {{"version", kResultsVersion},
+          {"scene", scene},
+          {"camera", preset_hash("cameras", "camera", cell.camera)},
+          {"trajectory", preset_hash("trajectories", "trajectory", cell.trajectory)},
+          {"resolution", s.resolution},
+          {"frames", s.frames},
+          {"seed", cell.seed},
+          {"render", json::parse(settings_json(s.render))}};
+}
+
+std::string short_hash(const json& key) {
+  return sha256_of_bytes(key.dump()).substr(0, kHashLetters);
+}
+
+// What a program's estimate is a function of: its arguments, and its text where it is a file.
+json command_key(const ExternalMethod& method) {
+  const std::string& program = method.command[0];
+  return {{"command", method.command},
+          {"program", fs::is_regular_file(program) ? sha256_of_file(program) : std::string()}};
+}
+
+// The finished metrics are whole, since they are written so; what is asked for is one word of them.
+bool tried_again(const fs::path& metrics) { return read_json(metrics).value("try_again", false); }
+
+}  // namespace
+
+fs::path CellFiles::simulation() const {
+  fs::path file = dataset;
+  file += ".json";
+  return file;
+}
+
+bool CellFiles::dataset_finished() const {
+  return fs::exists(DatasetLayout{dataset}.manifest()) && fs::exists(simulation());
+}
+
+bool CellFiles::finished() const {
+  return fs::exists(metrics) && dataset_finished() && !tried_again(metrics);
+}
+
+CellFiles files_of(const StudyOptions& study, const Cell& cell, const fs::path& out) {
+  const Variant& variant = study.variants[static_cast<std::size_t>(cell.variant)];
+  const json data_key = dataset_key(variant, cell);
+  const std::string where = fmt::format("{}_{}", stem(cell.camera), stem(cell.trajectory));
+  CellFiles files;
+  files.dataset = out / "datasets" / fmt::format("{}_{}", where, short_hash(data_key));
+  if (!variant.scene_text.empty())
+    files.scene = out / "scenes" / (short_hash(variant.scene_text) + ".yaml");
+  json key = {{"dataset", data_key}};
+  if (const ExternalMethod* const command = study.command_of(cell.method)) {
+    key["command"] = command_key(*command);
+  } else {
+    ReconOptions recon = variant.recon;
+    recon.method = cell.method;
+    recon.seed = cell.seed;
+    key["recon"] = to_json_text(motion_options(recon));
+    files.motion = out / "motions" / fmt::format("{}_{}.cbor", where, short_hash(key));
+    key["recon"] = to_json_text(recon);
+  }
+  const std::string name = fmt::format("{}_{}_{}", where, cell.method, short_hash(key));
+  files.estimate = out / "estimates" / name;
+  files.metrics = out / "metrics" / (name + ".json");
+  return files;
+}
+
+json read_json(const fs::path& file) {
+  try {
+    return json::parse(read_text(file));
+  } catch (const json::exception& error) {
+    fail("{}: not JSON: {}", file.string(), error.what());
+  }
+}
+
+CellResult read_cell(const Cell& cell, const CellFiles& files) {
+  CellResult result{cell, files.dataset, files.estimate, read_json(files.metrics)};
+  result.metrics.erase("try_again");
+  return result;
+}
+
+}  // namespace rugae

@@ -1,0 +1,36 @@
+#pragma once
+// Where the parts of a cell lie: each in a file or folder named by a hash of everything that made
+// it (options, the text of every preset named, the version), so that cells share what is the same,
+// a finished part is kept when the study runs again, and a part with other settings is made beside
+// it.
+
+#include <filesystem>
+#include <string>
+
+#include "studies/cell.h"
+
+namespace rugae {
+
+struct CellFiles {
+  std::filesystem::path dataset;   // OUT/datasets/<camera>_<trajectory>_<hash>/
+  std::filesystem::path motion;    // OUT/motions/<camera>_<trajectory>_<hash>.cbor; ours alone
+  std::filesystem::path estimate;  // OUT/estimates/<camera>_<trajectory>_<method>_<hash>/
+  std::filesystem::path metrics;   // OUT/metrics/<camera>_<trajectory>_<method>_<hash>.json
+  std::filesystem::path scene;     // OUT/scenes/<hash>.yaml, of a scene that stands in the study
+
+  /// What simulating measured: beside the dataset.
+  std::filesystem::path simulation() const;
+  bool dataset_finished() const;
+  /// The metrics are there, and not those of a failure that is tried again.
+  bool finished() const;
+};
+
+CellFiles files_of(const StudyOptions& study, const Cell& cell, const std::filesystem::path& out);
+
+/// Throws Error naming the file when it is not JSON.
+nlohmann::json read_json(const std::filesystem::path& file);
+
+/// The result of a cell that was made.
+CellResult read_cell(const Cell& cell, const CellFiles& files);
+
+}  // namespace rugae

@@ -1,0 +1,126 @@
+#include "studies/make_cell.h"
+
+#include <functional>
+#include <optional>
+
+#include "core/check.h"
+#include "core/files.h"
+#include "dataset/estimate.h"
+#include "dataset/observations.h"
+#include "recon/pipeline.h"
+#include "validate/evaluate.h"
+
+namespace rugae {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+json simulation_json(const SimulateResult& r) {
+  return {{"frames", r.frames},
+          {"path_length_mm", r.path_length_mm},
+          {"min_clearance_mm", r.min_clearance_mm},
+          {"seconds", r.wall_s},
+          {"frames_per_s", r.wall_s > 0.0 ? json((r.frames - r.skipped) / r.wall_s) : json()},
+          {"trace_thread_s", r.trace_s},
+          {"shade_thread_s", r.shade_s},
+          {"label_thread_s", r.label_s},
+          {"sensor_thread_s", r.sensor_s},
+          {"encode_thread_s", r.encode_s},
+          {"write_thread_s", r.write_s}};
+}
+
+void make_dataset(const Variant& variant, const Cell& cell, const CellFiles& files,
+                  Progress& progress) {
+  if (files.dataset_finished()) return;
+  SimulateOptions options = variant.simulate;
+  options.camera = cell.camera;
+  options.trajectory = cell.trajectory;
+  options.seed = cell.seed;
+  if (!files.scene.empty()) {
+    make_folder(files.scene.parent_path());
+    write_atomic(files.scene, variant.scene_text);
+    options.scene = files.scene.string();
+  }
+  make_folder(files.dataset.parent_path());
+  const json measured = simulation_json(simulate(options, files.dataset, progress));
+  write_atomic(files.simulation(), measured.dump(2) + "\n");
+}
+
+// The motion of an earlier run, or of a cell whose map is made otherwise.
+Motion make_motion(const FrameSource& frames, const ReconOptions& options, const fs::path& file,
+                   Progress& progress) {
+  if (fs::exists(file)) return read_motion(file);
+  Motion motion = estimate_motion(frames, options, Stages(), progress);
+  make_folder(file.parent_path());
+  write_motion(file, motion);
+  return motion;
+}
+
+void reconstruct_in_halves(const Variant& variant, const Cell& cell, const CellFiles& files,
+                           Progress& progress) {
+  ReconOptions options = variant.recon;
+  options.method = cell.method;
+  options.seed = cell.seed;
+  progress.begin("preprocessing");
+  const FrameSource frames(Observations::open(files.dataset), options.preprocess);
+  const Motion motion = make_motion(frames, options, files.motion, progress);
+  build_map(frames, motion, options, files.estimate, Stages(), progress);
+}
+
+// The reason when the method gave up on these frames.
+std::optional<std::string> make_estimate(const std::function<void()>& method,
+                                         const fs::path& estimate, Progress& progress) {
+  if (fs::exists(EstimateLayout{estimate}.info())) return std::nullopt;
+  fs::remove_all(estimate);  // what a killed run left of the map: it has no middle to go on from
+  make_folder(estimate);
+  try {
+    method();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    progress.end("gave up");
+    return error.what();
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+void make_cell(const StudyOptions& study, const Cell& cell, const CellFiles& files,
+               Progress& progress) {
+  const Variant& variant = study.variants[static_cast<std::size_t>(cell.variant)];
+  make_dataset(variant, cell, files, progress);
+  const ExternalMethod* const command = study.command_of(cell.method);
+  const auto method = [&] {
+    if (command)
+      reconstruct_by(*command, files.dataset, files.estimate, progress);
+    else
+      reconstruct_in_halves(variant, cell, files, progress);
+  };
+  if (const auto gave_up = make_estimate(method, files.estimate, progress)) {
+    // A program may be mended; ours gives up on the same frames each time.
+    write_failure(files, *gave_up, command != nullptr);
+    return;
+  }
+  json metrics = evaluate(files.dataset, files.estimate, progress);
+  metrics["simulation"] = read_json(files.simulation());
+  make_folder(files.metrics.parent_path());
+  write_atomic(files.metrics, metrics.dump(1) + "\n");
+}
+
+void write_failure(const CellFiles& files, const std::string& reason, bool try_again) {
+  json metrics = {{"failed", reason}};
+  if (try_again) metrics["try_again"] = true;
+  if (fs::exists(files.simulation())) {
+    const json simulation = read_json(files.simulation());
+    const int frames = simulation.at("frames");
+    metrics["simulation"] = simulation;
+    metrics["tracking"] = {
+        {"frames", frames}, {"tracked", 0}, {"lost", frames}, {"tracked_share", 0.0}};
+  }
+  make_folder(files.metrics.parent_path());
+  write_atomic(files.metrics, metrics.dump(1) + "\n");
+}
+
+}  // namespace rugae

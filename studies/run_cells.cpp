@@ -1,0 +1,240 @@
+#include "studies/run_cells.h"
+
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <set>
+#include <thread>
+
+#include "cameras/camera.h"
+#include "core/check.h"
+#include "core/files.h"
+#include "studies/make_cell.h"
+#include "studies/process.h"
+
+namespace rugae {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kFreeShare = 0.8;  // of the memory that is free, where no budget is given
+constexpr auto kPoll = std::chrono::milliseconds(50);
+constexpr int kBadInput = 2, kStopped = 130;  // exit codes of the program
+
+double free_memory_gb() {
+  std::ifstream file("/proc/meminfo");
+  std::string word;
+  double kib = 0.0;
+  while (file >> word)
+    if (word == "MemAvailable:") file >> kib;
+  return kib / (1024.0 * 1024.0);
+}
+
+double pixels_of(const Camera& camera) {
+  return static_cast<double>(camera.lens.width) * camera.lens.height;
+}
+
+// What a cell takes of the time, in pixels.
+double weight_of(const CellJob& job) {
+  constexpr double kOfAFrame = 1e5;  // what a frame costs beside its pixels
+  constexpr int kTrajectories = 6;   // in the paper
+  const Camera camera = load_camera(job.cell.camera);
+  const int asked = job.study->variants[job.cell.variant].simulate.frames;
+  const int frames = asked > 0 ? asked : camera.frames_in_paper / kTrajectories;
+  return frames * (pixels_of(camera) + kOfAFrame);
+}
+
+// What the cell will make that others may want as well.
+std::set<fs::path> shared_parts(const CellJob& job) {
+  std::set<fs::path> parts;
+  if (!job.files.dataset_finished()) parts.insert(job.files.dataset);
+  if (!job.files.motion.empty() && !fs::exists(job.files.motion)) parts.insert(job.files.motion);
+  parts.insert(job.files.metrics);
+  return parts;
+}
+
+// What the program said, without its own name before it.
+std::string without_name(const std::string& line) {
+  const std::string name = "rugae: ";
+  return line.starts_with(name) ? line.substr(name.size()) : line;
+}
+
+struct Running {
+  const CellJob* job = nullptr;
+  std::unique_ptr<Process> process;
+  std::set<fs::path> makes;
+  double memory_gb = 0.0;
+};
+
+// How long the rest will take, by what this run has made.
+class TimeLeft {
+ public:
+  explicit TimeLeft(const std::vector<CellJob>& jobs) {
+    for (const CellJob& job : jobs) left_ += weight_of(job);
+  }
+  void done(const CellJob& job) {
+    left_ -= weight_of(job);
+    made_ += weight_of(job);
+  }
+  std::string text() const {
+    const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+    const double minutes = seconds / made_ * left_ / 60.0;
+    return minutes < 1.5 ? fmt::format("{:.0f} s left", 60.0 * minutes)
+                         : fmt::format("{:.0f} min left", minutes);
+  }
+
+ private:
+  double left_ = 0.0, made_ = 0.0;
+  Clock::time_point start_ = Clock::now();
+};
+
+class Workers {
+ public:
+  Workers(const fs::path& study, const fs::path& out, const RunOptions& options, Progress& progress)
+      : study_(study), out_(out), options_(options), progress_(progress) {
+    if (options_.memory_gb <= 0.0) options_.memory_gb = kFreeShare * free_memory_gb();
+  }
+
+  void run(std::vector<CellJob> waiting) {
+    TimeLeft time_left(waiting);
+    progress_.begin("cells", waiting.size());
+    while (!waiting.empty() || !running_.empty()) {
+      start_what_fits(waiting);
+      std::this_thread::sleep_for(kPoll);
+      progress_.step(0);  // throws when a stop is wished; the processes end with `running_`
+      for (auto at = running_.begin(); at != running_.end();) {
+        if (!at->process->has_ended()) {
+          ++at;
+          continue;
+        }
+        finish(*at);
+        time_left.done(*at->job);
+        progress_.step();
+        progress_.say(
+            fmt::format("  {}: {:.0f} s, {:.1f} GB{}", at->job->cell.title(),
+                        at->process->ended().seconds, at->process->ended().peak_rss_mb / 1024.0,
+                        waiting.empty() && running_.size() == 1 ? "" : "; " + time_left.text()));
+        at = running_.erase(at);
+      }
+    }
+    progress_.end();
+  }
+
+ private:
+  void start_what_fits(std::vector<CellJob>& waiting) {
+    for (std::size_t i = 0;
+         i < waiting.size() && static_cast<int>(running_.size()) < options_.jobs;) {
+      if (waiting[i].files.finished() && is_free(shared_parts(waiting[i]))) {
+        progress_.step();  // another cell of this run was the same
+        waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(i));
+        continue;
+      }
+      if (!may_start(waiting[i])) {
+        ++i;
+        continue;
+      }
+      start(waiting[i]);
+      waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+  }
+
+  bool is_free(const std::set<fs::path>& parts) const {
+    return std::ranges::none_of(running_, [&](const Running& r) {
+      return std::ranges::any_of(parts, [&](const fs::path& p) { return r.makes.contains(p); });
+    });
+  }
+
+  // One may always run, whatever it needs.
+  bool may_start(const CellJob& job) const {
+    double used_gb = memory_gb_of(job);
+    for (const Running& r : running_) used_gb += r.memory_gb;
+    return running_.empty() || (used_gb <= options_.memory_gb && is_free(shared_parts(job)));
+  }
+
+  fs::path log_of(const CellJob& job) const {
+    return out_ / "logs" / (job.files.metrics.stem().string() + ".log");
+  }
+
+  void start(const CellJob& job) {
+    make_folder(out_ / "logs");
+    const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
+    const unsigned threads = std::max(1u, cores / static_cast<unsigned>(options_.jobs));
+    kept_.push_back(std::make_unique<CellJob>(job));
+    const std::vector<std::string> command = {options_.program.string(),
+                                              "run",
+                                              study_.string(),
+                                              "--out",
+                                              out_.string(),
+                                              "--cell",
+                                              std::to_string(job.index),
+                                              "--threads",
+                                              std::to_string(threads)};
+    running_.push_back({kept_.back().get(), std::make_unique<Process>(command, log_of(job)),
+                        shared_parts(job), memory_gb_of(job)});
+  }
+
+  void finish(const Running& r) {
+    const Ended& ended = r.process->ended();
+    if (ended.success()) {
+      check(r.job->files.finished() || fs::exists(r.job->files.metrics),
+            "{}: the cell ended without metrics; its output is in {}", r.job->cell.title(),
+            log_of(*r.job).string());
+      return;
+    }
+    if (WIFEXITED(ended.status)) {
+      const int code = WEXITSTATUS(ended.status);
+      const std::string said = without_name(last_line_of(log_of(*r.job)));
+      if (code == kStopped) throw Interrupted(said);
+      if (code == kBadInput) fail("{}", said);
+    }
+    write_failure(
+        r.job->files,
+        fmt::format("the process of this cell ended with {}{}; its output is in {}", ended.how(),
+                    WIFSIGNALED(ended.status) && WTERMSIG(ended.status) == SIGKILL
+                        ? " (no memory left?)"
+                        : "",
+                    log_of(*r.job).string()),
+        true);
+  }
+
+  fs::path study_, out_;
+  RunOptions options_;
+  Progress& progress_;
+  std::vector<Running> running_;
+  std::vector<std::unique_ptr<CellJob>> kept_;
+};
+
+}  // namespace
+
+void RunOptions::check() const {
+  rugae::check(jobs >= 1, "jobs is {}, expected at least 1", jobs);
+  rugae::check(memory_gb >= 0.0, "memory_gb is {}, expected at least 0 (0: what is free)",
+               memory_gb);
+}
+
+double memory_gb_of(const CellJob& job) {
+  constexpr double kFixedGb = 0.4, kGbAPixel = 1.6e-6;
+  return kFixedGb + kGbAPixel * pixels_of(load_camera(job.cell.camera));
+}
+
+void run_cells(const std::vector<CellJob>& jobs, const fs::path& study_file, const fs::path& out,
+               const RunOptions& options, Progress& progress) {
+  options.check();
+  std::vector<CellJob> waiting;
+  for (const CellJob& job : jobs)
+    if (!job.files.finished()) waiting.push_back(job);
+  if (options.jobs > 1 && waiting.size() > 1 && !options.program.empty()) {
+    Workers(study_file, out, options, progress).run(std::move(waiting));
+    return;
+  }
+  for (const CellJob& job : waiting)
+    if (!job.files.finished()) make_cell(*job.study, job.cell, job.files, progress);
+}
+
+}  // namespace rugae

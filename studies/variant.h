@@ -1,0 +1,33 @@
+#pragma once
+// What a cell is made with, beside its camera, trajectory, method and seed.
+
+#include <string>
+#include <vector>
+
+#include "core/yaml.h"
+#include "recon/options.h"
+#include "render/simulate.h"
+#include "studies/axes.h"
+
+namespace rugae {
+
+/// One combination of the study's axes.
+struct Variant {
+  std::vector<Setting> settings;  // empty where there are no axes
+  SimulateOptions simulate;       // camera, trajectory and seed are those of the cell
+  std::string scene_text;  // YAML of a scene that stands in the study; simulate.scene is then what
+                           // it builds on
+  ReconOptions recon;      // method and seed are those of the cell
+};
+
+/// Reads the keys `scene` (a preset, a file, or a mapping as in a scene file), `resolution`,
+/// `frames`, `render` and `recon`. `study_file` is where paths of the scene go from.
+Variant read_variant(YamlReader& study, const std::string& study_file);
+
+/// The variants of a study's text: one for each combination of its axes. An axis can set whatever
+/// the file can; a change below `scene` builds on the scene that is named. Throws Error with the
+/// place of the axis for a path or a value that the file could not hold.
+std::vector<Variant> read_variants(const std::string& text, const std::string& study_file,
+                                   const std::vector<Axis>& axes);
+
+}  // namespace rugae
