@@ -2,6 +2,7 @@
 
 #include <sys/prctl.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
@@ -43,6 +44,7 @@ void add_run(CLI::App& app, int& exit_code) {
     fs::path study, out;
     RunOptions options;
     int cell = -1, threads = 0;
+    pid_t parent = 0;
     bool json = false;
   };
   const auto a = std::make_shared<Arguments>();
@@ -59,14 +61,17 @@ void add_run(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command.add_option("--threads", a->threads, "Threads of a cell; 0: all processors")
       ->capture_default_str();
-  command.add_option("--cell", a->cell)->group("");  // what the command itself starts
+  // What the command itself starts.
+  command.add_option("--cell", a->cell)->group("");
+  command.add_option("--parent", a->parent)->group("");
   add_json_flag(command, a->json);
   command.callback([a, &exit_code] {
     const ThreadLimit limit(a->threads);
     const fs::path study = find_preset("studies", "study", a->study.string());
     Progress progress;
     if (a->cell >= 0) {
-      prctl(PR_SET_PDEATHSIG, SIGKILL);  // a cell does not outlive the study that started it
+      prctl(PR_SET_PDEATHSIG, SIGKILL);    // a cell does not outlive the study that started it
+      if (getppid() != a->parent) return;  // it has ended already
       run_one_cell(study, a->out, a->cell, progress);
       return;
     }

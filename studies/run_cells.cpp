@@ -1,6 +1,7 @@
 #include "studies/run_cells.h"
 
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -173,6 +174,8 @@ class Workers {
                                               out_.string(),
                                               "--cell",
                                               std::to_string(job.index),
+                                              "--parent",
+                                              std::to_string(getpid()),
                                               "--threads",
                                               std::to_string(threads)};
     running_.push_back({kept_.back().get(), std::make_unique<Process>(command, log_of(job)),
