@@ -56,6 +56,8 @@ cv::Mat Truth::label(const std::string& name, int index) const {
   return image;
 }
 
+bool Truth::wall_moves() const { return std::filesystem::exists(layout_.wall_motion(0)); }
+
 TriangleMesh Truth::wall(int index) const {
   const auto file = layout_.wall_motion(index);
   if (!std::filesystem::exists(file)) return wall_;

@@ -55,6 +55,7 @@ class Truth {
   const Camera& camera() const { return camera_; }
   const PoseTrack& track() const { return track_; }
   const TriangleMesh& wall() const { return wall_; }  // at rest
+  bool wall_moves() const;
   /// The wall at the frame's time: without normals where it has moved.
   TriangleMesh wall(int index) const;
   /// The camera while the frame was read out.

@@ -169,11 +169,7 @@ void normalise(Structure& s) {
   for (Track& track : s.tracks) track.point = moved * track.point;
 }
 
-void finish_structure(Structure& s, const Lens& lens, const BundleOptions& options,
-                      Progress& progress) {
-  progress.begin("bundle adjustment");
-  const double focal_px = lens.fx;
-  adjust_all(s, focal_px, options, kFinalRounds, kFinalTolerance);
+void settle_structure(Structure& s, double focal_px) {
   for (Track& track : s.tracks)
     std::erase_if(track.observations,
                   [&](const auto& o) { return !o.inlier || !s.placed[o.keyframe]; });
@@ -188,8 +184,14 @@ void finish_structure(Structure& s, const Lens& lens, const BundleOptions& optio
     }
   }
   s.mean_reprojection_px = count > 0 ? sum / static_cast<double>(count) : 0.0;
-  progress.end(fmt::format("{} points, {} observations, {:.3f} px", s.tracks.size(), count,
-                           s.mean_reprojection_px));
+}
+
+void finish_structure(Structure& s, const Lens& lens, const BundleOptions& options,
+                      Progress& progress) {
+  progress.begin("bundle adjustment");
+  adjust_all(s, lens.fx, options, kFinalRounds, kFinalTolerance);
+  settle_structure(s, lens.fx);
+  progress.end(fmt::format("{} points, {:.3f} px", s.tracks.size(), s.mean_reprojection_px));
 }
 
 Structure build_structure(const std::vector<int>& frames, std::vector<Track> tracks,

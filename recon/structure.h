@@ -55,6 +55,9 @@ Structure build_structure(const std::vector<int>& frames, std::vector<Track> tra
 void finish_structure(Structure& structure, const Lens& lens, const BundleOptions& options,
                       Progress& progress);
 
+/// The end of the above without adjusting: for poses that are not to be moved.
+void settle_structure(Structure& structure, double focal_px);
+
 /// Moves the world into the camera of the first placed key frame and scales it so that the median
 /// depth of the points it sees is one.
 void normalise(Structure& structure);

@@ -36,7 +36,8 @@ struct Light {
 
 Light light_of(const Scratch& s, int k, const RenderOptions& options) {
   return {s.radiance.wall[k] * s.surface.material[k].albedo,
-          options.paths.bounces > 0 ? s.indirect[k] : Vec3f(Vec3f::Zero()), s.radiance.coat[k]};
+          options.paths.bounces > 0 ? s.indirect[k] : Vec3f(Vec3f::Zero()),
+          options.highlights ? s.radiance.coat[k] : 0.0f};
 }
 
 void store(const Scratch& s, const RayTable& rays, const RenderOptions& options,

@@ -25,6 +25,7 @@ struct RenderOptions {
   PathOptions paths = {};       // of light that comes over other walls
   bool keep_materials = false;  // for gather
   std::string device = {};      // the Raycaster's; no result depends on it
+  bool highlights = true;       // the lights mirrored by the wet layer
 };
 
 struct CleanFrame {

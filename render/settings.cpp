@@ -16,6 +16,7 @@ void fields(Visitor& v, LensSettings& o) {
 
 template <typename Visitor>
 void fields(Visitor& v, LightSettings& o) {
+  v.flag("highlights", o.highlights);
   v.number("bounces", o.bounces, 0, kMostBounces);
   v.number("samples", o.samples, 1, kMostPaths);
   v.flag("roulette", o.roulette);

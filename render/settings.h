@@ -27,9 +27,10 @@ struct TruthSettings {
 };
 
 struct LightSettings {
-  int bounces = 0;       // of light between walls, before it comes to the camera
-  int samples = 16;      // paths a pixel, where there are bounces
-  bool roulette = true;  // long paths end by chance, without bias
+  bool highlights = true;  // the lights mirrored by the wet layer
+  int bounces = 0;         // of light between walls, before it comes to the camera
+  int samples = 16;        // paths a pixel, where there are bounces
+  bool roulette = true;    // long paths end by chance, without bias
 };
 
 struct RenderSettings {

@@ -176,7 +176,8 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
          .labels = options.render.wanted_labels(),
          .paths = {light.bounces, light.samples, light.roulette, mount.noise_seed},
          .keep_materials = options.render.lens.samples > 1,
-         .device = options.ray_device});
+         .device = options.ray_device,
+         .highlights = light.highlights});
     const Motion motion(renderer.wall(), scene.motion, path.between,
                         {.frames = frames,
                          .fps = camera.sensor.fps,

@@ -62,18 +62,18 @@ bool tried_again(const fs::path& metrics) { return read_json(metrics).value("try
 
 }  // namespace
 
-fs::path CellFiles::simulation() const {
+fs::path simulation_of(const fs::path& dataset) {
   fs::path file = dataset;
   file += ".json";
   return file;
 }
 
-bool CellFiles::dataset_finished() const {
-  return fs::exists(DatasetLayout{dataset}.manifest()) && fs::exists(simulation());
+bool dataset_finished(const fs::path& dataset) {
+  return fs::exists(DatasetLayout{dataset}.manifest()) && fs::exists(simulation_of(dataset));
 }
 
 bool CellFiles::finished() const {
-  return fs::exists(metrics) && dataset_finished() && !tried_again(metrics);
+  return fs::exists(metrics) && dataset_finished(dataset) && !tried_again(metrics);
 }
 
 CellFiles files_of(const StudyOptions& study, const Cell& cell, const fs::path& out) {
@@ -81,10 +81,19 @@ CellFiles files_of(const StudyOptions& study, const Cell& cell, const fs::path& 
   const json data_key = dataset_key(variant, cell);
   const std::string where = fmt::format("{}_{}", stem(cell.camera), stem(cell.trajectory));
   CellFiles files;
-  files.dataset = out / "datasets" / fmt::format("{}_{}", where, short_hash(data_key));
+  const auto dataset = [&](const json& key) {
+    return out / "datasets" / fmt::format("{}_{}", where, short_hash(key));
+  };
+  files.dataset = files.frames = dataset(data_key);
   if (!variant.scene_text.empty())
     files.scene = out / "scenes" / (short_hash(variant.scene_text) + ".yaml");
-  json key = {{"dataset", data_key}};
+  json key = {{"dataset", data_key},
+              {"replace", replace_names()[static_cast<std::size_t>(variant.replace)]}};
+  if (variant.replace == Replace::frames) {
+    const json clean_key = dataset_key(with_clean_frames(variant), cell);
+    files.frames = dataset(clean_key);
+    key["frames"] = clean_key;
+  }
   if (const ExternalMethod* const command = study.command_of(cell.method)) {
     key["command"] = command_key(*command);
   } else {

@@ -12,18 +12,21 @@
 namespace rugae {
 
 struct CellFiles {
-  std::filesystem::path dataset;   // OUT/datasets/<camera>_<trajectory>_<hash>/
-  std::filesystem::path motion;    // OUT/motions/<camera>_<trajectory>_<hash>.cbor; ours alone
+  std::filesystem::path dataset;  // OUT/datasets/<camera>_<trajectory>_<hash>/
+  std::filesystem::path frames;   // the dataset whose frames are reconstructed: the same, but where
+                                  // others take their place
+  std::filesystem::path motion;   // OUT/motions/<camera>_<trajectory>_<hash>.cbor; ours alone
   std::filesystem::path estimate;  // OUT/estimates/<camera>_<trajectory>_<method>_<hash>/
   std::filesystem::path metrics;   // OUT/metrics/<camera>_<trajectory>_<method>_<hash>.json
   std::filesystem::path scene;     // OUT/scenes/<hash>.yaml, of a scene that stands in the study
 
-  /// What simulating measured: beside the dataset.
-  std::filesystem::path simulation() const;
-  bool dataset_finished() const;
   /// The metrics are there, and not those of a failure that is tried again.
   bool finished() const;
 };
+
+/// What simulating measured: beside the dataset.
+std::filesystem::path simulation_of(const std::filesystem::path& dataset);
+bool dataset_finished(const std::filesystem::path& dataset);
 
 CellFiles files_of(const StudyOptions& study, const Cell& cell, const std::filesystem::path& out);
 

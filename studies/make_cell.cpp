@@ -30,28 +30,28 @@ json simulation_json(const SimulateResult& r) {
           {"write_thread_s", r.write_s}};
 }
 
-void make_dataset(const Variant& variant, const Cell& cell, const CellFiles& files,
-                  Progress& progress) {
-  if (files.dataset_finished()) return;
+void make_dataset(const Variant& variant, const Cell& cell, const fs::path& scene,
+                  const fs::path& dataset, Progress& progress) {
+  if (dataset_finished(dataset)) return;
   SimulateOptions options = variant.simulate;
   options.camera = cell.camera;
   options.trajectory = cell.trajectory;
   options.seed = cell.seed;
-  if (!files.scene.empty()) {
-    make_folder(files.scene.parent_path());
-    write_atomic(files.scene, variant.scene_text);
-    options.scene = files.scene.string();
+  if (!scene.empty()) {
+    make_folder(scene.parent_path());
+    write_atomic(scene, variant.scene_text);
+    options.scene = scene.string();
   }
-  make_folder(files.dataset.parent_path());
-  const json measured = simulation_json(simulate(options, files.dataset, progress));
-  write_atomic(files.simulation(), measured.dump(2) + "\n");
+  make_folder(dataset.parent_path());
+  const json measured = simulation_json(simulate(options, dataset, progress));
+  write_atomic(simulation_of(dataset), measured.dump(2) + "\n");
 }
 
 // The motion of an earlier run, or of a cell whose map is made otherwise.
-Motion make_motion(const FrameSource& frames, const ReconOptions& options, const fs::path& file,
-                   Progress& progress) {
+Motion make_motion(const FrameSource& frames, const ReconOptions& options, const Stages& stages,
+                   const fs::path& file, Progress& progress) {
   if (fs::exists(file)) return read_motion(file);
-  Motion motion = estimate_motion(frames, options, Stages(), progress);
+  Motion motion = estimate_motion(frames, options, stages, progress);
   make_folder(file.parent_path());
   write_motion(file, motion);
   return motion;
@@ -63,9 +63,11 @@ void reconstruct_in_halves(const Variant& variant, const Cell& cell, const CellF
   options.method = cell.method;
   options.seed = cell.seed;
   progress.begin("preprocessing");
-  const FrameSource frames(Observations::open(files.dataset), options.preprocess);
-  const Motion motion = make_motion(frames, options, files.motion, progress);
-  build_map(frames, motion, options, files.estimate, Stages(), progress);
+  const Observations observations = Observations::open(files.frames);
+  const FrameSource frames(observations, options.preprocess);
+  const Stages stages = stages_with(variant.replace, files.dataset, observations.lens());
+  const Motion motion = make_motion(frames, options, stages, files.motion, progress);
+  build_map(frames, motion, options, files.estimate, stages, progress);
 }
 
 // The reason when the method gave up on these frames.
@@ -90,7 +92,9 @@ std::optional<std::string> make_estimate(const std::function<void()>& method,
 void make_cell(const StudyOptions& study, const Cell& cell, const CellFiles& files,
                Progress& progress) {
   const Variant& variant = study.variants[static_cast<std::size_t>(cell.variant)];
-  make_dataset(variant, cell, files, progress);
+  make_dataset(variant, cell, files.scene, files.dataset, progress);
+  if (files.frames != files.dataset)
+    make_dataset(with_clean_frames(variant), cell, files.scene, files.frames, progress);
   const ExternalMethod* const command = study.command_of(cell.method);
   const auto method = [&] {
     if (command)
@@ -104,7 +108,7 @@ void make_cell(const StudyOptions& study, const Cell& cell, const CellFiles& fil
     return;
   }
   json metrics = evaluate(files.dataset, files.estimate, progress);
-  metrics["simulation"] = read_json(files.simulation());
+  metrics["simulation"] = read_json(simulation_of(files.dataset));
   make_folder(files.metrics.parent_path());
   write_atomic(files.metrics, metrics.dump(1) + "\n");
 }
@@ -112,8 +116,8 @@ void make_cell(const StudyOptions& study, const Cell& cell, const CellFiles& fil
 void write_failure(const CellFiles& files, const std::string& reason, bool try_again) {
   json metrics = {{"failed", reason}};
   if (try_again) metrics["try_again"] = true;
-  if (fs::exists(files.simulation())) {
-    const json simulation = read_json(files.simulation());
+  if (fs::exists(simulation_of(files.dataset))) {
+    const json simulation = read_json(simulation_of(files.dataset));
     const int frames = simulation.at("frames");
     metrics["simulation"] = simulation;
     metrics["tracking"] = {

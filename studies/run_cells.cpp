@@ -54,7 +54,8 @@ double weight_of(const CellJob& job) {
 // What the cell will make that others may want as well.
 std::set<fs::path> shared_parts(const CellJob& job) {
   std::set<fs::path> parts;
-  if (!job.files.dataset_finished()) parts.insert(job.files.dataset);
+  for (const fs::path& dataset : {job.files.dataset, job.files.frames})
+    if (!dataset_finished(dataset)) parts.insert(dataset);
   if (!job.files.motion.empty() && !fs::exists(job.files.motion)) parts.insert(job.files.motion);
   parts.insert(job.files.metrics);
   return parts;

@@ -108,7 +108,18 @@ Variant read_variant(YamlReader& study, const std::string& study_file) {
   check(variant.simulate.frames >= 0, "{}: frames is {}, expected at least 0 (0: as in the paper)",
         study.where("frames"), variant.simulate.frames);
   if (auto recon = study.child("recon")) read_options(*recon, variant.recon);
+  int replace = 0;
+  study.get_choice("replace", replace_names(), replace);
+  variant.replace = static_cast<Replace>(replace);
   variant.simulate.check();
+  return variant;
+}
+
+Variant with_clean_frames(Variant variant) {
+  RenderSettings& render = variant.simulate.render;
+  render.light.highlights = false;
+  render.lens.vignetting = render.lens.motion_blur = render.lens.defocus = false;
+  render.sensor.noise = render.sensor.prnu = render.sensor.dsnu = false;
   return variant;
 }
 

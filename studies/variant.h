@@ -8,6 +8,7 @@
 #include "recon/options.h"
 #include "render/simulate.h"
 #include "studies/axes.h"
+#include "studies/oracle.h"
 
 namespace rugae {
 
@@ -18,10 +19,14 @@ struct Variant {
   std::string scene_text;  // YAML of a scene that stands in the study; simulate.scene is then what
                            // it builds on
   ReconOptions recon;      // method and seed are those of the cell
+  Replace replace = Replace::nothing;
 };
 
+/// The same without what spoils frames: noise, highlights, vignetting and blur.
+Variant with_clean_frames(Variant variant);
+
 /// Reads the keys `scene` (a preset, a file, or a mapping as in a scene file), `resolution`,
-/// `frames`, `render` and `recon`. `study_file` is where paths of the scene go from.
+/// `frames`, `render`, `recon` and `replace`. `study_file` is where paths of the scene go from.
 Variant read_variant(YamlReader& study, const std::string& study_file);
 
 /// The variants of a study's text: one for each combination of its axes. An axis can set whatever

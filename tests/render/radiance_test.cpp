@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
+
 #include "render/bsdf.h"
 #include "render/frame.h"
 #include "tests/render/walls.h"
@@ -126,6 +128,32 @@ TEST(Radiance, CoatGradientMovesTheHighlight) {
   const auto expected = camera.lens.project(Vec3(0.2, 0.0, 1.0));
   EXPECT_NEAR(best_x + 0.5, expected->x(), 1.01);
   EXPECT_NEAR(best_y + 0.5, expected->y(), 1.01);
+}
+
+// Without highlights a frame is what it is with them, less their part.
+TEST(Radiance, HighlightsAreOneSwitch) {
+  MucosaSample wet = lambert(0.4f);
+  wet.coverage = 1.0f;
+  wet.roughness = 0.3f;
+  wet.f0 = 0.03f;
+  LabelSet parts = LabelSet::none();
+  parts.diffuse = parts.specular = true;
+  const auto render = [&](bool highlights, int samples) {
+    const FrameRenderer renderer(Surface(test::sphere_mesh(4, 25.0), constant_material(wet)),
+                                 small_camera(),
+                                 {.vignetting = false, .labels = parts, .highlights = highlights});
+    CleanFrame frame = renderer.render(kAtOrigin, nullptr);
+    if (samples > 0) frame.radiance = renderer.gather(FrameView(), {.samples = samples});
+    return frame;
+  };
+  const CleanFrame with = render(true, 0), without = render(false, 0);
+  ASSERT_GT(cv::countNonZero(with.truth.specular), 0);
+  EXPECT_EQ(cv::countNonZero(without.truth.specular), 0);
+  EXPECT_EQ(cv::norm(without.radiance, with.truth.diffuse, cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(without.truth.diffuse, with.truth.diffuse, cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::countNonZero(without.truth.masks & kMaskSpecular), 0);
+  // Gathered from several samples likewise: one through the centre is the sharp frame.
+  EXPECT_LT(cv::sum(render(false, 4).radiance)[0], cv::sum(render(true, 4).radiance)[0]);
 }
 
 TEST(Radiance, SpecularMaskWhereTheCoatAddsItsShare) {

@@ -1,0 +1,257 @@
+#include "studies/oracle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/check.h"
+#include "core/sim3.h"
+#include "recon/growth.h"
+#include "recon/resection.h"
+#include "studies/wall_points.h"
+
+namespace rugae {
+namespace {
+
+constexpr double kOutlierPx = 4.0;       // times huber_px, of points triangulated from true poses
+constexpr std::size_t kMaxPoints = 400;  // that place a frame, as the reconstruction takes
+
+// Pixels of the frames as observed and as the reconstruction sees them, by the lens that it uses.
+class Grids {
+ public:
+  Grids(const Lens& observed, const Lens& preprocessed)
+      : observed_(observed), preprocessed_(preprocessed) {}
+  std::optional<Vec2> observed(const Vec2& pixel) const {
+    const auto ray = preprocessed_.unproject(pixel);
+    return ray ? observed_.project(*ray) : std::nullopt;
+  }
+  std::optional<Vec2> preprocessed(const Vec2& pixel) const {
+    const auto ray = observed_.unproject(pixel);
+    return ray ? preprocessed_.project(*ray) : std::nullopt;
+  }
+
+ private:
+  LensProjector observed_, preprocessed_;
+};
+
+class Oracle {
+ public:
+  Oracle(const std::filesystem::path& dataset, const Lens& lens) : wall_(dataset), lens_(lens) {}
+
+  Followed true_tracks(const FrameSource& frames, Followed followed) const {
+    const Grids grids(lens_, frames.lens());
+    std::vector<Track>& tracks = followed.tracks;
+    const int n = static_cast<int>(followed.keyframes.size());
+    // The wall point of a track is what its first observation sees.
+    std::vector<WallPoint> points(tracks.size());
+    for (int k = 0; k < n; ++k) {
+      std::vector<std::size_t> begun;
+      std::vector<Vec2> pixels;
+      for (std::size_t t = 0; t < tracks.size(); ++t) {
+        const Track::Observation& first = tracks[t].observations.front();
+        if (first.keyframe != k) continue;
+        const auto pixel = grids.observed(first.pixel);
+        if (!pixel) continue;
+        begun.push_back(t);
+        pixels.push_back(*pixel);
+      }
+      const auto seen = wall_.seen(followed.keyframes[k], pixels);
+      for (std::size_t i = 0; i < begun.size(); ++i) points[begun[i]] = seen[i];
+    }
+    for (int k = 0; k < n; ++k) move_observations(k, followed.keyframes[k], grids, points, tracks);
+    for (Track& track : tracks)
+      std::erase_if(track.observations, [](const auto& o) { return !o.inlier; });
+    std::erase_if(tracks, [](const Track& track) { return track.observations.size() < 2; });
+    set_rays(tracks, frames.lens());
+    return followed;
+  }
+
+  std::vector<std::optional<Rigid3>> resect(const FrameSource& frames, const Structure& structure,
+                                            const ReconOptions& options, Progress& progress) const {
+    std::vector<std::optional<Rigid3>> poses(static_cast<std::size_t>(frames.size()));
+    std::vector<int> keyframes;  // those placed
+    for (int k = 0; k < static_cast<int>(structure.frames.size()); ++k) {
+      if (!structure.placed[k]) continue;
+      poses[structure.frames[k]] = structure.cam_from_world[k];
+      keyframes.push_back(k);
+    }
+    progress.begin("resection by the true correspondences", poses.size());
+    for (int f = 0; f < frames.size() && !keyframes.empty(); ++f) {
+      progress.step();
+      if (poses[f]) continue;
+      const int nearest = *std::ranges::min_element(
+          keyframes, {}, [&](int k) { return std::abs(structure.frames[k] - f); });
+      poses[f] = place(frames, structure, nearest, f, options.bundle);
+    }
+    progress.end();
+    return poses;
+  }
+
+  // All key frames where they truly are, in the units of the reconstruction; points from our
+  // tracks.
+  Structure true_structure(const FrameSource& frames, const std::vector<int>& keyframes,
+                           std::vector<Track> tracks, const ReconOptions& options) const {
+    Structure s;
+    s.frames = keyframes;
+    s.placed.assign(keyframes.size(), true);
+    s.tracks = std::move(tracks);
+    for (const int f : keyframes) s.cam_from_world.push_back(true_pose(f).inverse());
+    update_points(s, frames.lens().fx, kOutlierPx * options.bundle.huber_px, options.bundle);
+    settle_structure(s, frames.lens().fx);
+    s.converged = true;
+    return s;
+  }
+
+  // In the world of a structure whose key frames are where they truly are.
+  std::vector<std::optional<Rigid3>> true_poses(const FrameSource& frames,
+                                                const Structure& structure) const {
+    const Sim3 map_from_world = map_from_true_world(structure);
+    std::vector<std::optional<Rigid3>> poses;
+    for (int f = 0; f < frames.size(); ++f)
+      poses.push_back((map_from_world * true_pose(f)).inverse());
+    for (std::size_t k = 0; k < structure.frames.size(); ++k)
+      poses[structure.frames[k]] = structure.cam_from_world[k];
+    return poses;
+  }
+
+  // The true depth where ours has any, in the units of the reconstruction.
+  std::optional<MosaicDepth> true_depth(std::optional<MosaicDepth> ours, const Mosaic& mosaic,
+                                        const Structure& structure, const Lens& lens) const {
+    if (!ours) return ours;
+    const double map_per_mm = map_from_true_world(structure).scale;
+    const LensProjector projector(lens);
+    std::vector<Vec3> rays;
+    std::vector<float*> places;
+    for (int y = 0; y < ours->depth.rows; ++y)
+      for (int x = 0; x < ours->depth.cols; ++x) {
+        float& z = ours->depth.at<float>(y, x);
+        if (!std::isfinite(z)) continue;
+        z = std::numeric_limits<float>::quiet_NaN();
+        const auto ray = projector.unproject(mosaic.origin_px + Vec2(x + 0.5, y + 0.5));
+        if (!ray || !(ray->z() > 0.0)) continue;
+        rays.push_back(*ray / ray->z());
+        places.push_back(&z);
+      }
+    const std::vector<double> depths = wall_.depths_mm(structure.frames[mosaic.anchor], rays);
+    for (std::size_t i = 0; i < places.size(); ++i)
+      *places[i] = static_cast<float>(map_per_mm * depths[i]);
+    return ours;
+  }
+
+ private:
+  Rigid3 true_pose(int frame) const {  // world_from_camera, mm
+    return wall_.truth().track()[static_cast<std::size_t>(frame)].world_from_camera;
+  }
+
+  // Moves the observations of a key frame to where the wall points are seen; those that are hidden
+  // are marked.
+  void move_observations(int keyframe, int frame, const Grids& grids,
+                         const std::vector<WallPoint>& points, std::vector<Track>& tracks) const {
+    std::vector<Track::Observation*> observations;
+    std::vector<WallPoint> wanted;
+    for (std::size_t t = 0; t < tracks.size(); ++t)
+      for (Track::Observation& o : tracks[t].observations) {
+        if (o.keyframe != keyframe) continue;
+        observations.push_back(&o);
+        wanted.push_back(points[t]);
+      }
+    const auto pixels = wall_.pixels(frame, wanted);
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      const auto pixel = pixels[i] ? grids.preprocessed(*pixels[i]) : std::nullopt;
+      observations[i]->inlier = pixel.has_value();
+      if (pixel) observations[i]->pixel = *pixel;
+    }
+  }
+
+  // A frame by the points that a key frame sees.
+  std::optional<Rigid3> place(const FrameSource& frames, const Structure& structure, int keyframe,
+                              int frame, const BundleOptions& options) const {
+    const Grids grids(lens_, frames.lens());
+    std::vector<Vec3> points;
+    std::vector<Vec2> there;
+    for (const Track& track : structure.tracks)
+      for (const Track::Observation& o : track.observations) {
+        if (o.keyframe != keyframe || points.size() == kMaxPoints) continue;
+        const auto pixel = grids.observed(o.pixel);
+        if (!pixel) continue;
+        points.push_back(track.point);
+        there.push_back(*pixel);
+      }
+    const auto wall = wall_.seen(structure.frames[keyframe], there);
+    const auto here = wall_.pixels(frame, wall);
+    std::vector<Vec3> seen;
+    std::vector<Vec2> rays;
+    for (std::size_t i = 0; i < here.size(); ++i) {
+      const auto pixel = here[i] ? grids.preprocessed(*here[i]) : std::nullopt;
+      const auto ray = pixel ? ray_of(frames.lens(), *pixel) : std::nullopt;
+      if (!ray) continue;
+      seen.push_back(points[i]);
+      rays.push_back(*ray);
+    }
+    const auto placed = place_by_points(seen, rays, frames.lens().fx, options);
+    return placed ? std::optional(placed->cam_from_world) : std::nullopt;
+  }
+
+  Sim3 map_from_true_world(const Structure& structure) const {
+    std::vector<Vec3> truth, ours;
+    for (std::size_t k = 0; k < structure.frames.size(); ++k) {
+      if (!structure.placed[k]) continue;
+      truth.push_back(true_pose(structure.frames[k]).translation);
+      ours.push_back(structure.cam_from_world[k].inverse().translation);
+    }
+    const auto found = umeyama(truth, ours, true);
+    check(found.has_value(),
+          "{} key frames are placed, or all on a line: the units of the map "
+          "cannot be told",
+          truth.size());
+    return *found;
+  }
+
+  WallPoints wall_;
+  Lens lens_;
+};
+
+}  // namespace
+
+const std::vector<std::string>& replace_names() {
+  static const std::vector<std::string> kNames = {"nothing",         "lens",  "frames",
+                                                  "correspondences", "poses", "depth"};
+  return kNames;
+}
+
+Stages stages_with(Replace replace, const std::filesystem::path& dataset, const Lens& lens) {
+  Stages stages;
+  const bool in_stages =
+      replace == Replace::correspondences || replace == Replace::poses || replace == Replace::depth;
+  if (!in_stages) return stages;
+  const auto oracle = std::make_shared<const Oracle>(dataset, lens);
+  const Stages ours;
+  if (replace == Replace::correspondences) {
+    stages.follow = [=](const FrameSource& frames, const Keyframes& keyframes,
+                        const ReconOptions& options, Progress& progress) {
+      return oracle->true_tracks(frames, ours.follow(frames, keyframes, options, progress));
+    };
+    stages.resect = [=](const FrameSource& frames, const Structure& structure,
+                        const ReconOptions& options, Progress& progress) {
+      return oracle->resect(frames, structure, options, progress);
+    };
+  }
+  if (replace == Replace::poses) {
+    stages.structure = [=](const FrameSource& frames, const std::vector<int>& keyframes,
+                           std::vector<Track> tracks, const ReconOptions& options, Progress&) {
+      return oracle->true_structure(frames, keyframes, std::move(tracks), options);
+    };
+    stages.resect = [=](const FrameSource& frames, const Structure& structure, const ReconOptions&,
+                        Progress&) { return oracle->true_poses(frames, structure); };
+  }
+  if (replace == Replace::depth)
+    stages.depth = [=](const Mosaic& mosaic, const Structure& structure, const Lens& map_lens,
+                       const ReconOptions& options) {
+      return oracle->true_depth(ours.depth(mosaic, structure, map_lens, options), mosaic, structure,
+                                map_lens);
+    };
+  return stages;
+}
+
+}  // namespace rugae
