@@ -136,6 +136,7 @@ TEST(Radiance, HighlightsAreOneSwitch) {
   wet.coverage = 1.0f;
   wet.roughness = 0.3f;
   wet.f0 = 0.03f;
+  const TriangleMesh sphere = test::sphere_mesh(4, 25.0);
   LabelSet parts = LabelSet::none();
   parts.diffuse = parts.specular = true;
   const auto render = [&](bool highlights, int samples) {
