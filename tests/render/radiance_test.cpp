@@ -140,8 +140,7 @@ TEST(Radiance, HighlightsAreOneSwitch) {
   LabelSet parts = LabelSet::none();
   parts.diffuse = parts.specular = true;
   const auto render = [&](bool highlights, int samples) {
-    const FrameRenderer renderer(Surface(test::sphere_mesh(4, 25.0), constant_material(wet)),
-                                 small_camera(),
+    const FrameRenderer renderer(Surface(sphere, constant_material(wet)), small_camera(),
                                  {.vignetting = false, .labels = parts, .highlights = highlights});
     CleanFrame frame = renderer.render(kAtOrigin, nullptr);
     if (samples > 0) frame.radiance = renderer.gather(FrameView(), {.samples = samples});
