@@ -20,10 +20,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kOutlierFactor = 3.0;  // of the median RMS error of a picture
-constexpr double kWorthwhile = 0.97;    // an extra term must lower the error below this share
 
-// The models tried, simple ones first: a model replaces the one before it only when it is worth
-// its terms.
+// The models tried, simple ones first.
 struct Candidate {
   const char* name;
   LensModel model;
@@ -177,15 +175,29 @@ Errors summary(const std::vector<CalibrationImage>& images, const Fit& fit, doub
   return summary(all);
 }
 
+// What a model's terms must be worth: the Bayesian information criterion of Schwarz 1978,
+// doi:10.1214/aos/1176344136,
+//
+//   n ln(RSS / n) + terms ln(n)
+//
+// of n coordinates, where the poses, alike for all models, are left out. The lowest wins.
+double information(const Candidate& candidate, double rms_px, std::size_t coordinates) {
+  const double n = static_cast<double>(coordinates);
+  const double terms = candidate.radial + (candidate.tangential ? 2 : 0);
+  return n * std::log(rms_px * rms_px) + terms * std::log(n);
+}
+
 struct Choice {
   std::optional<Fit> best;
-  double rms_px = 0.0;
+  double information = 0.0;
   std::vector<ModelTrial> trials;
 };
 
 Choice choose(const std::vector<CalibrationImage>& images, int width, int height,
               const CalibrationOptions& options) {
   const Points points = points_of(images, options.square_mm);
+  std::size_t coordinates = 0;
+  for (const auto& pixels : points.pixels) coordinates += 2 * pixels.size();
   Choice choice;
   for (const Candidate& candidate : kCandidates) {
     if (options.model && *options.model != candidate.model) continue;
@@ -207,10 +219,10 @@ Choice choose(const std::vector<CalibrationImage>& images, int width, int height
       trial.refused = error.what();
     }
     if (!std::isfinite(errors.rms_px)) trial.refused = "does not see every corner";
-    const bool better = !choice.best || errors.rms_px < kWorthwhile * choice.rms_px;
-    if (trial.refused.empty() && better) {
+    const double info = information(candidate, errors.rms_px, coordinates);
+    if (trial.refused.empty() && (!choice.best || info < choice.information)) {
       choice.best = found;
-      choice.rms_px = errors.rms_px;
+      choice.information = info;
     }
     choice.trials.push_back(trial);
   }

@@ -14,7 +14,7 @@ namespace rugae {
 struct CalibrationOptions {
   int columns = 0, rows = 0;        // inner corners of the board; both 0: searched for
   double square_mm = 1.0;           // scales the board's poses alone, not the lens
-  std::optional<LensModel> model;   // not given: the model with the lower error
+  std::optional<LensModel> model;   // not given: chosen by its error and its number of terms
   double max_image_error_px = 3.0;  // a picture with a larger RMS error is rejected, and so is one
                                     // above three times the median
   int min_images = 3;

@@ -7,6 +7,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "recon/corner_fit.h"
+
 namespace rugae {
 namespace {
 
@@ -64,6 +66,24 @@ double signed_area(const std::vector<cv::Point2f>& c, int columns) {
   return (d - a).cross(e - b);
 }
 
+// From the corner's neighbours on the board, so along its edges in the picture.
+CornerGuess guess_of(const std::vector<cv::Point2f>& corners, int columns, int rows, int i) {
+  const int c = i % columns, r = i / columns;
+  const auto at = [&](int column, int row) {
+    const cv::Point2f& p = corners[static_cast<std::size_t>(row * columns + column)];
+    return Vec2(p.x + 0.5, p.y + 0.5);
+  };
+  // The direction from one neighbour to the other, as long as the shorter way.
+  const auto along = [](const Vec2& before, const Vec2& here, const Vec2& after) -> Vec2 {
+    const double back = (here - before).norm(), forth = (after - here).norm();
+    const double length = back > 0.0 && forth > 0.0 ? std::min(back, forth) : back + forth;
+    return length * (after - before).normalized();
+  };
+  const Vec2 here = at(c, r);
+  return {here, along(at(std::max(c - 1, 0), r), here, at(std::min(c + 1, columns - 1), r)),
+          along(at(c, std::max(r - 1, 0)), here, at(c, std::min(r + 1, rows - 1)))};
+}
+
 BoardView to_view(const cv::Mat& gray, std::vector<cv::Point2f> corners, double zoom, int columns,
                   int rows) {
   // resize() maps pixel areas: (x + 0.5) = (X + 0.5) / zoom.
@@ -87,7 +107,11 @@ BoardView to_view(const cv::Mat& gray, std::vector<cv::Point2f> corners, double 
   BoardView view;
   view.columns = columns;
   view.rows = rows;
-  for (const cv::Point2f& c : corners) view.corners_px.emplace_back(c.x + 0.5, c.y + 0.5);
+  constexpr double kMostShift_px = 1.0;
+  for (int i = 0; i < columns * rows; ++i) {
+    const CornerGuess guess = guess_of(corners, columns, rows, i);
+    view.corners_px.push_back(fit_corner(gray, guess, kMostShift_px).value_or(guess.pixel));
+  }
   return view;
 }
 

@@ -14,6 +14,7 @@
 #include "render/scene_truth.h"
 #include "render/sensor.h"
 #include "render/tracks.h"
+#include "scenes/chessboard.h"
 #include "trajectories/trajectory.h"
 
 namespace rugae {
@@ -32,16 +33,52 @@ struct Path {
 };
 
 // As many frames as the paper has for this camera and trajectory, or as the track in a file has
-// poses; a path that is neither is taken for as long as the paper's first.
+// poses, or as a stop-motion has views; a path that is none of these is taken for as long as the
+// paper's first.
 int default_frames(const TrajectoryOptions& trajectory, const Camera& camera) {
+  if (trajectory.board.count > 0) return trajectory.board.count;
   if (!trajectory.file.empty()) return static_cast<int>(read_tum(trajectory.file).size());
   return frames_of_trajectory(camera, std::max(1, trajectory.paper_number));
+}
+
+// Scene and trajectory both of a board, or neither.
+void check_board(const SimulateOptions& options, const TrajectoryOptions& trajectory,
+                 const Scene& scene) {
+  const bool looks_at_board = trajectory.board.count > 0;
+  check(!looks_at_board || scene.board,
+        "trajectory '{}' looks at a chessboard, but scene '{}' is none; try the scene 'chessboard'",
+        trajectory.name, options.scene);
+  check(!scene.board || looks_at_board,
+        "scene '{}' is a flat chessboard, in which no path can be planned; try the trajectory "
+        "'chessboard'",
+        options.scene);
+}
+
+// A stop-motion: the camera rests while a frame is taken.
+Path find_board_views(const TrajectoryOptions& trajectory, int frames, const Camera& camera,
+                      const Scene& scene, std::uint64_t seed) {
+  const Eigen::AlignedBox2d extent = scene.board->extent_mm();
+  const BoardOutline outline{.first_mm = {extent.min().x(), extent.min().y(), 0.0},
+                             .across_mm = {extent.sizes().x(), 0.0, 0.0},
+                             .down_mm = {0.0, extent.sizes().y(), 0.0}};
+  PoseTrack track =
+      plan_board_views(camera.lens, outline, trajectory.board, trajectory.clearance_mm, frames,
+                       camera.sensor.fps, seed, trajectory.name);
+  const ClosestPoint closest(scene.wall);
+  Path path{track, [track](double frame) { return held_pose(track, frame); }, length_mm(track),
+            std::numeric_limits<double>::infinity()};
+  for (const TimedPose& pose : track)
+    path.min_clearance_mm =
+        std::min(path.min_clearance_mm, closest(pose.world_from_camera.translation).distance_mm);
+  return path;
 }
 
 Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajectory,
                const Mount& mount, const Scene& scene) {
   const Camera& camera = mount.camera;
   const int frames = options.frames > 0 ? options.frames : default_frames(trajectory, camera);
+  check_board(options, trajectory, scene);
+  if (scene.board) return find_board_views(trajectory, frames, camera, scene, options.seed);
   // a planned path keeps clear of wherever the wall may move; a given one is only checked
   TrajectoryOptions at_rest = trajectory;
   at_rest.clearance_mm += mount.reach_mm;
@@ -64,8 +101,10 @@ Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajecto
           path.length_mm(), path.min_clearance_mm()};
 }
 
-double row_time_s(const RenderSettings& render, const Camera& camera) {
-  const bool rolling = render.lens.rolling_shutter && camera.sensor.shutter == Shutter::rolling;
+// Where nothing moves while a frame is taken, all rows see the same.
+double row_time_s(const RenderSettings& render, const Camera& camera, const Scene& scene) {
+  const bool rolling =
+      render.lens.rolling_shutter && !scene.board && camera.sensor.shutter == Shutter::rolling;
   return rolling ? 1e-6 * camera.sensor.row_time_us : 0.0;
 }
 
@@ -96,7 +135,7 @@ DatasetInfo info_of(const SimulateOptions& options, int frames, const Camera& ca
                  output.paired};
   const TruthSettings& truth = options.render.truth;
   const bool labels = options.render.labels;
-  info.truth = {options.render.wanted_labels(), row_time_s(options.render, camera) > 0.0,
+  info.truth = {options.render.wanted_labels(), row_time_s(options.render, camera, scene) > 0.0,
                 static_cast<bool>(scene.motion), labels && truth.tracks > 0,
                 labels && truth.coverage};
   info.text = with_scene(settings_json(options.render), scene);
@@ -117,7 +156,12 @@ void SimulateOptions::check() const {
 SimulateResult simulate(const SimulateOptions& options, const std::filesystem::path& out,
                         Progress& progress) {
   options.check();
-  if (is_rig(options.camera)) return simulate_rig(options, load_rig(options.camera), out, progress);
+  if (is_rig(options.camera)) {
+    check(load_trajectory(options.trajectory).board.count == 0,
+          "trajectory '{}' is planned for one camera; simulate the cameras of rig '{}' one by one",
+          options.trajectory, options.camera);
+    return simulate_rig(options, load_rig(options.camera), out, progress);
+  }
   return simulate_mounted(options, {load_camera(options.camera), {}, 0.0, options.seed}, out,
                           progress);
 }
@@ -175,14 +219,16 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
         {.vignetting = options.render.lens.vignetting,
          .labels = options.render.wanted_labels(),
          .paths = {light.bounces, light.samples, light.roulette, mount.noise_seed},
-         .keep_materials = options.render.lens.samples > 1,
+         // A pixel's material stands for all of its footprint, but not for what lies beyond an edge
+         // of print.
+         .keep_materials = options.render.lens.samples > 1 && !scene.board,
          .device = options.ray_device,
          .highlights = light.highlights});
     const Motion motion(renderer.wall(), scene.motion, path.between,
                         {.frames = frames,
                          .fps = camera.sensor.fps,
                          .height = camera.lens.height,
-                         .row_time_s = row_time_s(options.render, camera),
+                         .row_time_s = row_time_s(options.render, camera, scene),
                          .moves_within = options.render.lens.motion_blur,
                          .in_flight = 2 * threads});
     const SensorOptions sensing{.chain = options.render.sensor,

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/float4.h"
+#include "scenes/chessboard.h"
 
 namespace rugae {
 namespace {
@@ -15,12 +16,18 @@ constexpr int kFour = 4;  // lanes at once
 
 }  // namespace
 
-Surface::Surface(const Scene& scene)
-    : wall_(&scene.wall),
-      material_([mucosa = &scene.mucosa](std::span<const MaterialQuery> queries,
+Surface::Surface(const Scene& scene) : wall_(&scene.wall) {
+  // What is asked is asked so often that the choice is made once.
+  if (scene.board)
+    material_ = [board = scene.board](std::span<const MaterialQuery> queries,
+                                      std::span<MucosaSample> samples) {
+      board->sample(queries, samples);
+    };
+  else
+    material_ = [mucosa = &scene.mucosa](std::span<const MaterialQuery> queries,
                                          std::span<MucosaSample> samples) {
-        mucosa->sample(queries, samples);
-      }) {
+      mucosa->sample(queries, samples);
+    };
   pack(scene.rest_positions, scene.regions);
 }
 

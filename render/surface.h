@@ -39,7 +39,8 @@ struct SurfaceTile {
 
 class Surface {
  public:
-  /// Keeps references: the scene must outlive it. The material is the scene's mucosa.
+  /// Keeps references: the scene must outlive it. The material is the scene's mucosa, or
+  /// the print of its board.
   explicit Surface(const Scene& scene);
   /// A wall of any material; rest positions are the vertices.
   Surface(const TriangleMesh& wall, Material material);

@@ -6,6 +6,7 @@
 #include "core/check.h"
 #include "core/presets.h"
 #include "core/yaml.h"
+#include "scenes/chessboard.h"
 #include "scenes/deformation.h"
 #include "scenes/import.h"
 #include "scenes/instances.h"
@@ -39,6 +40,25 @@ OrganMotion find_motion(const SceneFile& file, std::uint64_t seed, const Triangl
   return make_motion(options, zone, axis, wall.vertices);
 }
 
+Scene board_scene(const SceneFile& file, const std::string& name, std::uint64_t seed) {
+  const auto board = std::make_shared<const Chessboard>(file.board);
+  Scene scene{.name = name,
+              .wall = board->mesh(),
+              .rest_positions = {},
+              .regions = {},
+              .instances = std::make_shared<const Instances>(std::vector<WallInstance>{}),
+              .mucosa = Mucosa(file.mucosa, seed),
+              .board = board,
+              .motion = {},
+              .motion_reach_mm = 0.0,
+              .seed = seed,
+              .notes = {},
+              .resolved_yaml = resolved_yaml(file)};
+  scene.rest_positions = scene.wall.vertices;
+  scene.regions.assign(scene.wall.vertices.size(), Region::unknown);
+  return scene;
+}
+
 bool is_mesh_file(const std::string& name_or_path) {
   std::string extension = std::filesystem::path(name_or_path).extension().string();
   std::ranges::transform(extension, extension.begin(),
@@ -69,6 +89,8 @@ Scene load_scene(const SceneRequest& request) {
   } else {
     file = read_scene_file(find_preset("scenes", "scene", request.name_or_path), request.seed);
   }
+  const std::string name = std::filesystem::path(request.name_or_path).stem().string();
+  if (file.kind == SceneKind::chessboard) return board_scene(file, name, request.seed);
   file.mucosa.oil = std::max(file.mucosa.oil, request.oil);
   ImportedWall wall;
   std::vector<Region> regions;
@@ -89,12 +111,13 @@ Scene load_scene(const SceneRequest& request) {
   }
   const auto shared = std::make_shared<const Instances>(std::move(instances));
   OrganMotion motion = find_motion(file, request.seed, wall.mesh);
-  Scene scene{.name = std::filesystem::path(request.name_or_path).stem().string(),
+  Scene scene{.name = name,
               .wall = std::move(wall.mesh),
               .rest_positions = {},
               .regions = std::move(regions),
               .instances = shared,
               .mucosa = Mucosa(file.mucosa, request.seed, std::move(tint), shared),
+              .board = nullptr,
               .motion = std::move(motion.motion),
               .motion_reach_mm = motion.reach_mm,
               .seed = request.seed,

@@ -59,6 +59,7 @@ struct MucosaOptions {
   void check(const std::string& where) const;
 };
 
+class Chessboard;
 class Instances;
 class RegionTint;
 
@@ -104,6 +105,8 @@ struct Scene {
   std::vector<Region> regions;       // of the vertices
   std::shared_ptr<const Instances> instances;  // lesions and objects; null: none
   Mucosa mucosa;
+  std::shared_ptr<const Chessboard> board =
+      nullptr;                   // where the wall is one, its print in place of mucosa
   WallMotion motion;             // empty: the wall keeps still
   double motion_reach_mm = 0.0;  // no vertex is ever farther from its rest position
   std::uint64_t seed = 1;

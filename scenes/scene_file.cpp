@@ -16,7 +16,7 @@
 namespace rugae {
 namespace {
 
-const std::vector<std::string> kKinds = {"procedural", "mesh"};
+const std::vector<std::string> kKinds = {"procedural", "mesh", "chessboard"};
 const std::vector<std::string> kWallNormals = {"auto", "outward", "inward"};
 const std::vector<std::string> kOpenEnds = {"cap", "refuse"};
 
@@ -56,6 +56,16 @@ void keys(Visitor& v, Objects& o) {
   v("debris", o.of.debris);
   v("bubbles", o.of.bubbles);
   v("mucus", o.of.mucus);
+}
+template <typename Visitor>
+void keys(Visitor& v, ChessboardOptions& o) {
+  v("columns", o.columns);
+  v("rows", o.rows);
+  v("square_mm", o.square_mm);
+  v("border_mm", o.border_mm);
+  v("white", o.white);
+  v("black", o.black);
+  v("gloss", o.gloss);
 }
 struct Shape {
   StomachOptions& of;
@@ -238,6 +248,11 @@ void read_over(SceneFile& scene, YamlReader& yaml, const std::filesystem::path& 
   int kind = static_cast<int>(scene.kind);
   yaml.get_choice("kind", kKinds, kind);
   scene.kind = static_cast<SceneKind>(kind);
+  if (scene.kind == SceneKind::chessboard) {
+    read_section<ChessboardOptions&>(yaml, "board", seed, scene.board);
+    scene.board.check(file.string() + ": board");
+    return yaml.finish();
+  }
   if (scene.kind == SceneKind::mesh) {
     read_import(yaml, scene, file);
     for (const char* key : {"lesions", "objects"})
@@ -280,6 +295,7 @@ std::vector<std::string> list_scene_keys() {
   lister.of<MucosaOptions&>("mucosa", any.mucosa);
   lister.of("lesions", Lesions{any.stomach.instances});
   lister.of("objects", Objects{any.stomach.instances});
+  lister.of<ChessboardOptions&>("board", any.board);
   for (const Field& field : list_deformation()) lister.list.push_back("deformation." + field.path);
   return std::move(lister.list);
 }
@@ -287,6 +303,11 @@ std::vector<std::string> list_scene_keys() {
 std::string resolved_yaml(const SceneFile& scene) {
   SceneFile all = scene;
   Writer writer;
+  if (scene.kind == SceneKind::chessboard) {
+    writer.text = "kind: chessboard\n";
+    writer.section<ChessboardOptions&>("board", all.board);
+    return writer.text;
+  }
   if (scene.kind == SceneKind::mesh) {
     writer.text = fmt::format(
         "kind: mesh\nmesh: {}\n",

@@ -5,13 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "scenes/chessboard.h"
 #include "scenes/deformation.h"
 #include "scenes/import.h"
 #include "scenes/stomach.h"
 
 namespace rugae {
 
-enum class SceneKind { procedural, mesh };
+enum class SceneKind { procedural, mesh, chessboard };
 
 struct SceneFile {
   SceneKind kind = SceneKind::procedural;
@@ -20,11 +21,12 @@ struct SceneFile {
   std::filesystem::path mesh;
   MucosaOptions mucosa;
   DeformationOptions deformation;
+  ChessboardOptions board;  // of kind chessboard: all there is of it
 };
 
 /// With `like: NAME_OR_FILE` what the file does not say is as in that preset or file (core/like.h).
 ///
-/// A number of `relief`, `mucosa`, `lesions` or `objects`, `scale` and `variation` may be a
+/// A number of `relief`, `mucosa`, `board`, `lesions` or `objects`, `scale` and `variation` may be a
 /// distribution in place of a value:
 ///   {uniform: [least, most]}, {normal: [mean, deviation]} (cut off at two deviations),
 ///   {choice: [value, ...]} (all alike).

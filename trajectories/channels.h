@@ -12,6 +12,8 @@ enum TrajectoryChannel : std::uint32_t {
   kChannelSwayAround = 4,
   kChannelSwayAlong = 5,
   kChannelBursts = 6,
+  kChannelBoardStart = 7,
+  kChannelBoardView = 8,
 };
 
 }  // namespace rugae

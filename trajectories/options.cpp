@@ -38,6 +38,14 @@ void check_ranges(const TrajectoryOptions& o, const PlaceOf& place_of) {
         place_of("pace.peak_speed"), o.pace.peak_speed * o.pace.burst_share);
   in_range("read_noise_factor", o.read_noise_factor, 0.0, 1000.0);
   in_range("oil", o.oil, 0.0, 1.0);
+  in_range("board.views", o.board.count, 0, 10000);
+  in_range("board.least_fill", o.board.least_fill, 0.05, 0.95);
+  in_range("board.most_fill", o.board.most_fill, 0.05, 0.95);
+  in_range("board.most_tilt_deg", deg_from_rad(o.board.most_tilt_rad), 0.0, 60.0);
+  in_range("board.central_share", o.board.central_share, 0.0, 1.0);
+  check(o.board.least_fill <= o.board.most_fill,
+        "{}: board.least_fill is {}, expected at most board.most_fill, which is {}",
+        place_of("board.least_fill"), o.board.least_fill, o.board.most_fill);
 }
 
 /// A field of a group stands where the group's reader says, any other where the file's does.
@@ -77,6 +85,14 @@ void read(YamlReader& yaml, TrajectoryOptions& options) {
     pace->get("bursts", options.pace.bursts);
     pace->get("burst_share", options.pace.burst_share);
     pace->finish();
+  }
+  if (auto board = yaml.child("board")) {
+    board->get("views", options.board.count);
+    board->get("least_fill", options.board.least_fill);
+    board->get("most_fill", options.board.most_fill);
+    board->get_deg("most_tilt_deg", options.board.most_tilt_rad);
+    board->get("central_share", options.board.central_share);
+    board->finish();
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include "core/mesh.h"
 #include "core/pose_track.h"
+#include "trajectories/board_views.h"
 
 namespace rugae {
 
@@ -50,6 +51,7 @@ struct TrajectoryOptions {
   PaceOptions pace;
   double read_noise_factor = 1.0;  // trajectory 5: added sensor noise
   double oil = 0.0;                // trajectory 6: oil on the wall
+  BoardViewOptions board;          // with a count above 0: a stop-motion around a board
   /// Throws Error naming `where` and the field that is out of range.
   void check(const std::string& where) const;
 };

@@ -111,6 +111,11 @@ const std::vector<Field> kTrajectory = {
     {"pace.peak_speed", Kind::real, 1.0, 1.9, {}},  // with any share
     {"pace.burst_share", Kind::real, 0.0, 0.5, {}},
     {"pace.bursts", Kind::whole, 0, 1000, {}},
+    {"board.views", Kind::whole, 0, 10000, {}},
+    {"board.least_fill", Kind::real, 0.05, 0.35, {}},  // below any largest one
+    {"board.most_fill", Kind::real, 0.35, 0.95, {}},
+    {"board.most_tilt_deg", Kind::real, 0.0, 60.0, {}},
+    {"board.central_share", Kind::real, 0.0, 1.0, {}},
 };
 
 TEST_F(InputFiles, SoundTrajectoriesAreRead) {

@@ -48,6 +48,12 @@ const std::vector<Field> kImport = {
     {"target_edge_mm", Kind::real, 0.2, 10.0, {}},
     {"with_relief", Kind::flag, 0, 0, {}}};
 
+const std::vector<Field> kBoard = {
+    {"columns", Kind::whole, 3, 40, {}},       {"rows", Kind::whole, 3, 40, {}},
+    {"square_mm", Kind::real, 0.1, 100.0, {}}, {"border_mm", Kind::real, 0.1, 100.0, {}},
+    {"white", Kind::real, 0.5, 0.95, {}},      {"black", Kind::real, 0.0, 0.49, {}},
+    {"gloss", Kind::real, 0.0, 1.0, {}}};
+
 // A distribution all of whose draws lie within the field's range.
 std::string distribution_of(const Field& field) {
   switch (whole(0, 2)) {
@@ -78,6 +84,10 @@ struct Allowed {
 class SceneText {
  public:
   SceneText(SceneKind kind, const Allowed& allowed) : allowed_(allowed) {
+    if (kind == SceneKind::chessboard) {
+      if (flip()) section("board", kBoard);
+      return;
+    }
     if (kind == SceneKind::procedural) {
       some(kShape, true);
       if (flip()) section("lesions", kLesions);
@@ -155,17 +165,30 @@ void collect_keys(const YAML::Node& node, const std::string& section, std::set<s
   }
 }
 
+const char* name_of(SceneKind kind) {
+  switch (kind) {
+    case SceneKind::procedural:
+      return "procedural";
+    case SceneKind::mesh:
+      return "mesh";
+    case SceneKind::chessboard:
+      return "chessboard";
+  }
+  return "";
+}
+
 class SceneFiles : public test::InputFiles {
  protected:
-  SceneKind any_kind() const { return flip() ? SceneKind::procedural : SceneKind::mesh; }
+  SceneKind any_kind() const { return static_cast<SceneKind>(whole(0, 2)); }
   // A file of its own, or one that builds on a preset or on another file, of either kind.
   std::string random_scene(SceneKind kind, const Allowed& allowed, int depth = 0) {
     SceneText text(kind, allowed);
     std::optional<SceneKind> like;
     if (depth < 2 && whole(0, 2) == 0) {
       if (flip()) {
-        text.add("like", one_of(preset_names("scenes")));
-        like = SceneKind::procedural;
+        const std::string preset = one_of(preset_names("scenes"));
+        text.add("like", preset);
+        like = preset == "chessboard" ? SceneKind::chessboard : SceneKind::procedural;
       } else {
         like = any_kind();
         const std::string name = fmt::format("like_{}.yaml", depth);
@@ -174,8 +197,7 @@ class SceneFiles : public test::InputFiles {
       }
     }
     const SceneKind inherited = like.value_or(SceneKind::procedural);
-    if (kind != inherited || flip())
-      text.add("kind", kind == SceneKind::mesh ? "mesh" : "procedural");
+    if (kind != inherited || flip()) text.add("kind", name_of(kind));
     if (kind == SceneKind::mesh && (inherited != SceneKind::mesh || flip()))
       text.add("mesh", "wall.ply");
     const std::string written = text.str();
@@ -202,7 +224,8 @@ TEST_F(SceneFiles, SoundOnesAreReadAndWritten) {
 
 TEST_F(SceneFiles, AResolvedFileHoldsEveryKeyOfItsKind) {
   std::set<std::string> written;
-  for (const char* text : {"{kind: procedural}", "{kind: mesh, mesh: wall.ply}"})
+  for (const char* text :
+       {"{kind: procedural}", "{kind: mesh, mesh: wall.ply}", "{kind: chessboard}"})
     collect_keys(YAML::Load(resolved_yaml(read_scene_file(file(text), 1))), "", written);
   for (const std::string& key : list_scene_keys())
     EXPECT_TRUE(key == "like" || written.contains(key)) << key;
@@ -260,7 +283,8 @@ TEST_F(SceneFiles, SoundOnesRender) {
     RC_ASSERT(scene || message.find("no room on the wall") != std::string::npos);
     if (!scene) return;
     if (scene->motion) check_motion(*scene);
-    const Rigid3 pose(test::random_rotation(4), inside_of(*scene));
+    Rigid3 pose(test::random_rotation(4), inside_of(*scene));
+    if (scene->board) pose = Rigid3(Quat::Identity(), inside_of(*scene) - Vec3(0.0, 0.0, 20.0));
     const Rigid3 next(pose.rotation, pose.translation + Vec3(0.3, 0.2, 0.1));
     check_frame(FrameRenderer(*scene, camera, {}).render(pose, &next));
   });
@@ -281,10 +305,8 @@ TEST_F(SceneFiles, BrokenRandomOnesAreRefused) {
         // a value may stand in place of a distribution, so that is none of the mistakes
         const SceneKind kind = any_kind();
         SceneText text(kind, {.distributions = false, .renders = false});
-        if (kind == SceneKind::mesh) {
-          text.add("kind", "mesh");
-          text.add("mesh", "wall.ply");
-        }
+        if (kind != SceneKind::procedural) text.add("kind", name_of(kind));
+        if (kind == SceneKind::mesh) text.add("mesh", "wall.ply");
         return text.str();
       },
       read);

@@ -61,7 +61,7 @@ TEST_F(TrajectoryFile, WrongContents) {
       "is 1)");
   EXPECT_EQ(load_error("like: mine.yaml\n"), ":1:7: like goes in a circle");
   EXPECT_EQ(load_error("like: seven\n"),
-            ":1:7: like: trajectory 'seven': no such preset; known: 1, 2, 3, 4, 5, 6, inspection");
+            ":1:7: like: trajectory 'seven': no such preset; known: 1, 2, 3, 4, 5, 6, chessboard, inspection");
 }
 
 TEST_F(TrajectoryFile, LikeTakesWhatIsNotGiven) {
@@ -75,7 +75,7 @@ TEST_F(TrajectoryFile, LikeTakesWhatIsNotGiven) {
 
 TEST(TrajectoryPreset, UnknownName) {
   EXPECT_EQ(error_of([] { load_trajectory("seven"); }),
-            "trajectory 'seven': no such preset; known: 1, 2, 3, 4, 5, 6, inspection");
+            "trajectory 'seven': no such preset; known: 1, 2, 3, 4, 5, 6, chessboard, inspection");
 }
 
 TEST(TrajectoryPreset, LengthsNoiseAndOilOfTheSix) {
