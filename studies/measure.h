@@ -22,7 +22,8 @@
 namespace rugae {
 
 struct FeatureMeasureOptions {
-  int step = 1;                                 // pairs (i, i + step)
+  int step = 1;    // pairs (i, i + step)
+  int stride = 1;  // of every so many frames i, beginning with the first
   std::optional<PreprocessOptions> preprocess;  // empty: the frames as observed
   double ransac_threshold_px = 3.0;
   int grid = 8;  // cells across and down, of the coverage

@@ -94,15 +94,17 @@ class FeatureMeasure {
         grid_(options.grid, frames_.valid()) {
     check(frames_.size() == motion_.truth().size(), "{}: {} frames and {} true poses",
           dataset.string(), frames_.size(), motion_.truth().size());
-    check(pairs() > 0, "{}: {} frames, expected more than the step of {}", dataset.string(),
-          frames_.size(), options.step);
+    check(frames_.size() > options.step, "{}: {} frames, expected more than the step of {}",
+          dataset.string(), frames_.size(), options.step);
   }
 
-  int pairs() const { return frames_.size() - options_.step; }
+  int pairs() const {
+    return (frames_.size() - options_.step + options_.stride - 1) / options_.stride;
+  }
 
-  PairResult pair(int i) const {
+  PairResult pair(int k) const {
     PairResult result;
-    const int j = i + options_.step;
+    const int i = k * options_.stride, j = i + options_.step;
     const cv::Mat first = frames_.gray(i), second = frames_.gray(j);
     const double start_s = thread_seconds();
     const FeatureMatches matches = matcher_(i, j, first, second, frames_.valid());
@@ -113,8 +115,8 @@ class FeatureMeasure {
     const ReprojectedMatches led = reproject(matches, options_.seed, options_.ransac_threshold_px);
     result.found = led.homography_found;
     std::vector<Vec2> inliers;
-    for (std::size_t k = 0; k < led.inlier.size(); ++k)
-      if (led.inlier[k]) inliers.push_back(matches.first_px[k]);
+    for (std::size_t m = 0; m < led.inlier.size(); ++m)
+      if (led.inlier[m]) inliers.push_back(matches.first_px[m]);
     result.reprojection_px = inlier_errors_px(led);
     result.covered_by_inliers = grid_.covered(inliers);
 
@@ -272,6 +274,7 @@ class Sums {
 
 void FeatureMeasureOptions::check() const {
   rugae::check(step >= 1, "features: step is {}, expected at least 1", step);
+  rugae::check(stride >= 1, "features: stride is {}, expected at least 1", stride);
   rugae::check(ransac_threshold_px > 0.0, "features: ransac_threshold_px is {}, expected above 0",
                ransac_threshold_px);
   rugae::check(grid >= 1 && grid <= 64, "features: grid is {}, expected 1 to 64", grid);
@@ -287,7 +290,7 @@ json measure_matches(const std::filesystem::path& dataset, const std::string& na
   progress.begin(name, static_cast<std::size_t>(measure.pairs()));
   Sums sums;
   in_batches(
-      measure.pairs(), progress, [&](int i) { return measure.pair(i); },
+      measure.pairs(), progress, [&](int k) { return measure.pair(k); },
       [&](const PairResult& result) { sums.add(result); });
   progress.end();
   return sums.to_json();

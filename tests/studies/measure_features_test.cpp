@@ -70,6 +70,28 @@ TEST_F(MeasureFeatures, TrueMatchesHaveNoError) {
   }
 }
 
+// The matches of one pair alone are wrong.
+TEST_F(MeasureFeatures, AStrideLeavesPairsOut) {
+  world_.set().write(folder_ / "data");
+  const Matcher matcher = [this](int i, int j, const cv::Mat&, const cv::Mat&, const cv::Mat&) {
+    return truth_and(i == 3 ? Vec2(0.0, 9.0) : Vec2(0.0, 0.0))(i, j, {}, {}, {});
+  };
+  const auto of = [&](int stride, int step) {
+    FeatureMeasureOptions options;
+    options.stride = stride;
+    options.step = step;
+    const json m = measure(matcher, options);
+    return std::pair(m.at("pairs").get<int>(),
+                     m.at("endpoint").at("all").at("max_px").get<double>() > 8.0);
+  };
+  static_assert(TwoPlanes::kFrames == 6);
+  EXPECT_EQ(of(1, 1), std::pair(5, true));
+  EXPECT_EQ(of(2, 1), std::pair(3, false));  // 0, 2, 4
+  EXPECT_EQ(of(3, 1), std::pair(2, true));   // 0, 3
+  EXPECT_EQ(of(3, 3), std::pair(1, false));  // 0
+  EXPECT_EQ(of(9, 1), std::pair(1, false));
+}
+
 TEST_F(MeasureFeatures, ShiftedMatchesHaveTheShiftAsError) {
   world_.set().write(folder_ / "data");
   const json m = measure(truth_and(Vec2(1.5, -2.0)));  // 2.5 px
@@ -237,6 +259,9 @@ TEST_F(MeasureFeatures, BrokenInputIsNamed) {
   EXPECT_THROW(measure(FeatureMethod::orb, by_step(TwoPlanes::kFrames)), Error);
   FeatureMeasureOptions broken;
   broken.ransac_threshold_px = std::nan("");
+  EXPECT_THROW(measure(FeatureMethod::orb, broken), Error);
+  broken = {};
+  broken.stride = 0;
   EXPECT_THROW(measure(FeatureMethod::orb, broken), Error);
   const auto frame = folder_ / "data" / "observations" / "frames" / "000003.png";
   std::filesystem::resize_file(frame, 40);
