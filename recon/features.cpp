@@ -1,7 +1,5 @@
 #include "recon/features.h"
 
-#include <algorithm>
-#include <ctime>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
@@ -144,12 +142,6 @@ FeatureMatches match_flow(FeatureMethod method, const cv::Mat& first, const cv::
   return matches;
 }
 
-double cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
 }  // namespace
 
 std::string name_of(FeatureMethod method) {
@@ -192,15 +184,10 @@ FeatureMatches match_features(FeatureMethod method, const cv::Mat& first, const 
   return matches;
 }
 
-FeatureScore evaluate_feature(FeatureMethod method, const cv::Mat& first, const cv::Mat& second,
-                              std::uint64_t seed, double ransac_threshold_px,
-                              const cv::Mat& valid) {
-  FeatureScore score;
-  const double start = cpu_seconds();
-  const FeatureMatches matches = match_features(method, first, second, valid);
-  score.cpu_s = cpu_seconds() - start;
-  score.matches = static_cast<int>(matches.first_px.size());
-  if (matches.first_px.size() < kMinMatches) return score;
+ReprojectedMatches reproject(const FeatureMatches& matches, std::uint64_t seed,
+                             double ransac_threshold_px) {
+  ReprojectedMatches result;
+  if (matches.first_px.size() < kMinMatches) return result;
   std::vector<cv::Point2d> from, to;
   for (std::size_t i = 0; i < matches.first_px.size(); ++i) {
     from.emplace_back(matches.second_px[i].x(), matches.second_px[i].y());
@@ -212,25 +199,22 @@ FeatureScore evaluate_feature(FeatureMethod method, const cv::Mat& first, const 
   ransac.threshold = ransac_threshold_px;
   ransac.sampler = cv::SAMPLING_UNIFORM;
   ransac.score = cv::SCORE_METHOD_MSAC;
-  ransac.randomGeneratorState = static_cast<int>(
-      random_words(seed, Purpose::recon_ransac, 0, static_cast<std::uint64_t>(method))[0] >> 1);
+  ransac.randomGeneratorState =
+      static_cast<int>(random_words(seed, Purpose::recon_ransac, 0, 0)[0] >> 1);
   cv::Mat mask;
   const cv::Mat h = cv::findHomography(from, to, mask, ransac);
-  if (h.empty() || mask.total() != from.size()) return score;
+  if (h.empty() || mask.total() != from.size()) return result;
+  const int inliers = cv::countNonZero(mask);
+  if (inliers < static_cast<int>(kMinMatches)) return result;
   std::vector<cv::Point2d> reprojected;
   cv::perspectiveTransform(from, reprojected, h);
-  std::vector<double> errors;
-  for (std::size_t i = 0; i < from.size(); ++i)
-    if (mask.at<unsigned char>(static_cast<int>(i)))
-      errors.push_back(cv::norm(reprojected[i] - to[i]));
-  if (errors.size() < kMinMatches) return score;
-  score.homography_found = true;
-  score.inliers = static_cast<int>(errors.size());
-  for (const double e : errors) score.mean_error_px += e / static_cast<double>(errors.size());
-  std::nth_element(errors.begin(), errors.begin() + static_cast<long>(errors.size() / 2),
-                   errors.end());
-  score.median_error_px = errors[errors.size() / 2];
-  return score;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    result.error_px.push_back(cv::norm(reprojected[i] - to[i]));
+    result.inlier.push_back(mask.at<unsigned char>(static_cast<int>(i)) != 0 ? 1 : 0);
+  }
+  result.homography_found = true;
+  result.inliers = inliers;
+  return result;
 }
 
 }  // namespace rugae

@@ -30,18 +30,19 @@ struct FeatureMatches {
 FeatureMatches match_features(FeatureMethod method, const cv::Mat& first, const cv::Mat& second,
                               const cv::Mat& valid = {});
 
-struct FeatureScore {
-  int matches = 0, inliers = 0;
-  bool homography_found = false;  // false: the errors below mean nothing
-  double mean_error_px = 0.0;     // re-projection error of the inliers, second image onto the first
-  double median_error_px = 0.0;
-  double cpu_s = 0.0;  // of matching, this thread
+/// What a homography fitted to matches makes of them.
+struct ReprojectedMatches {
+  bool homography_found = false;  // false: there is nothing below
+  std::vector<double> error_px;   // of every match: second point led onto the first image, to the
+                                  // first point
+  std::vector<unsigned char> inlier;  // of every match: 1 where RANSAC took it for right
+  int inliers = 0;
 };
 
-/// Steps 2 to 4. Only inliers count, as in the paper's table: a method with few matches may still
-/// have a small error, so look at the counts as well.
-FeatureScore evaluate_feature(FeatureMethod method, const cv::Mat& first, const cv::Mat& second,
-                              std::uint64_t seed, double ransac_threshold_px = 3.0,
-                              const cv::Mat& valid = {});
+/// Steps 2 to 4, for all matches: the homography by RANSAC (OpenCV's USAC with uniform sampling and
+/// MSAC scores; the same for the same seed). The paper's table counts the inliers alone, and a
+/// method with few matches may still have a small error there: look at the counts as well.
+ReprojectedMatches reproject(const FeatureMatches& matches, std::uint64_t seed,
+                             double ransac_threshold_px = 3.0);
 
 }  // namespace rugae

@@ -96,11 +96,8 @@ struct FrameSource::Impl {
   }
 
   void estimate_gain() {
-    const int count = std::min(kVignettingFrames, observations.size());
     std::vector<cv::Mat> images, usable;
-    for (int i = 0; i < count; ++i) {
-      // The middle of the i-th of `count` equal parts of the sequence.
-      const int index = static_cast<int>((2LL * i + 1) * observations.size() / (2LL * count));
+    for (const int index : vignetting_frames(observations.size())) {
       const cv::Mat gray = gray_of(observations.image(index));
       images.push_back(move(gray));
       const cv::Mat reflection = move_mask(detect_reflections(gray, options.reflections, field));
@@ -134,6 +131,15 @@ struct FrameSource::Impl {
     return {index, correct(move(pose)), correct(move(map)), move_mask(reflection), valid};
   }
 };
+
+std::vector<int> vignetting_frames(int size) {
+  const int count = std::min(kVignettingFrames, size);
+  std::vector<int> frames;
+  // The middle of the i-th of `count` equal parts of the sequence.
+  for (int i = 0; i < count; ++i)
+    frames.push_back(static_cast<int>((2LL * i + 1) * size / (2LL * count)));
+  return frames;
+}
 
 FrameSource::FrameSource(const Observations& observations, const PreprocessOptions& options)
     : impl_(std::make_unique<Impl>(observations, options)) {}

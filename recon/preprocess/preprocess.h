@@ -22,6 +22,9 @@ struct Frame {
   cv::Mat valid;       // CV_8U, 255 where there was an original pixel that sees
 };
 
+/// The frames of a sequence from which the vignetting profile is estimated: sixteen, spread evenly.
+std::vector<int> vignetting_frames(int size);
+
 /// Reads and preprocesses frames on demand (memory does not grow with their number; a small cache
 /// holds the latest). Calls are thread-safe. De-vignetting: the profile is estimated once, from
 /// frames spread over the sequence.
