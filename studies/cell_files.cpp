@@ -76,6 +76,14 @@ bool CellFiles::finished() const {
   return fs::exists(metrics) && dataset_finished(dataset) && !tried_again(metrics);
 }
 
+CalibrationRun calibration_of(const Variant& variant, const Cell& cell) {
+  CalibrationRun run;
+  run.camera = cell.camera;
+  run.seed = cell.seed;
+  run.render = variant.simulate.render;
+  return run;
+}
+
 CellFiles files_of(const StudyOptions& study, const Cell& cell, const fs::path& out) {
   const Variant& variant = study.variants[static_cast<std::size_t>(cell.variant)];
   const json data_key = dataset_key(variant, cell);
@@ -93,6 +101,22 @@ CellFiles files_of(const StudyOptions& study, const Cell& cell, const fs::path& 
     const json clean_key = dataset_key(with_clean_frames(variant), cell);
     files.frames = dataset(clean_key);
     key["frames"] = clean_key;
+  }
+  if (variant.calibrate) {
+    files.calibration = calibration_folder(calibration_of(variant, cell), out);
+    key["calibration"] = files.calibration.filename().string();
+  }
+  if (variant.lens_error != 0.0) {
+    key["lens_error"] = variant.lens_error;
+    const json lens_key = {{"camera", preset_hash("cameras", "camera", cell.camera)},
+                           {"calibration", files.calibration.filename().string()},
+                           {"error", variant.lens_error}};
+    files.lens =
+        out / "lenses" / fmt::format("{}_{}.yaml", stem(cell.camera), short_hash(lens_key));
+  }
+  if (study.measure != Measure::loop) {
+    key["measure"] = measure_names()[static_cast<std::size_t>(study.measure)];
+    key["features"] = {study.features.step, study.features.stride};
   }
   if (const ExternalMethod* const command = study.command_of(cell.method)) {
     key["command"] = command_key(*command);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 
+#include "studies/calibration.h"
 #include "studies/cell.h"
 
 namespace rugae {
@@ -15,10 +16,12 @@ struct CellFiles {
   std::filesystem::path dataset;  // OUT/datasets/<camera>_<trajectory>_<hash>/
   std::filesystem::path frames;   // the dataset whose frames are reconstructed: the same, but where
                                   // others take their place
-  std::filesystem::path motion;   // OUT/motions/<camera>_<trajectory>_<hash>.cbor; ours alone
-  std::filesystem::path estimate;  // OUT/estimates/<camera>_<trajectory>_<method>_<hash>/
-  std::filesystem::path metrics;   // OUT/metrics/<camera>_<trajectory>_<method>_<hash>.json
-  std::filesystem::path scene;     // OUT/scenes/<hash>.yaml, of a scene that stands in the study
+  std::filesystem::path calibration;  // OUT/calibrations/<camera>_<hash>/, of a calibrated lens
+  std::filesystem::path lens;         // OUT/lenses/<camera>_<hash>.yaml, of one wrong on purpose
+  std::filesystem::path motion;       // OUT/motions/<camera>_<trajectory>_<hash>.cbor; ours alone
+  std::filesystem::path estimate;     // OUT/estimates/<camera>_<trajectory>_<method>_<hash>/
+  std::filesystem::path metrics;      // OUT/metrics/<camera>_<trajectory>_<method>_<hash>.json
+  std::filesystem::path scene;        // OUT/scenes/<hash>.yaml, of a scene that stands in the study
 
   /// The metrics are there, and not those of a failure that is tried again.
   bool finished() const;
@@ -29,6 +32,9 @@ std::filesystem::path simulation_of(const std::filesystem::path& dataset);
 bool dataset_finished(const std::filesystem::path& dataset);
 
 CellFiles files_of(const StudyOptions& study, const Cell& cell, const std::filesystem::path& out);
+
+/// The boards that the cell's lens is calibrated from.
+CalibrationRun calibration_of(const Variant& variant, const Cell& cell);
 
 /// Throws Error naming the file when it is not JSON.
 nlohmann::json read_json(const std::filesystem::path& file);

@@ -100,15 +100,16 @@ void ExternalMethod::check(const std::string& where) const {
     });
 }
 
-void reconstruct_by(const ExternalMethod& method, const fs::path& dataset, const fs::path& estimate,
-                    Progress& progress) {
+void reconstruct_by(const ExternalMethod& method, const fs::path& dataset,
+                    const fs::path& calibration, const fs::path& estimate, Progress& progress) {
   const DatasetLayout layout{fs::absolute(dataset)};
-  const Observations observations = Observations::open(dataset);
+  const Observations observations = Observations::open(dataset, calibration);
+  const fs::path lens = calibration.empty() ? layout.calibration() : fs::absolute(calibration);
   const fs::path results = fs::absolute(estimate) / "results", log = estimate / "command.log";
   make_folder(results);
   const std::map<std::string, std::string> values = {{"frames", layout.frames().string()},
                                                      {"frame_list", layout.frame_list().string()},
-                                                     {"calibration", layout.calibration().string()},
+                                                     {"calibration", lens.string()},
                                                      {"out", results.string()}};
   std::vector<std::string> command;
   for (const std::string& argument : method.command)

@@ -28,7 +28,9 @@ struct ExternalMethod {
 ///   map.ply          optional, same world
 /// Throws Error when it cannot be started, ends with an exit code other than 0, or leaves no
 /// trajectory or one whose times are not the frames'.
+/// `calibration` is a lens file in place of the dataset's own; empty: that.
 void reconstruct_by(const ExternalMethod& method, const std::filesystem::path& dataset,
-                    const std::filesystem::path& estimate, Progress& progress);
+                    const std::filesystem::path& calibration, const std::filesystem::path& estimate,
+                    Progress& progress);
 
 }  // namespace rugae

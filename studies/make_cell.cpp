@@ -3,11 +3,13 @@
 #include <functional>
 #include <optional>
 
+#include "cameras/lens_difference.h"
 #include "core/check.h"
 #include "core/files.h"
 #include "dataset/estimate.h"
 #include "dataset/observations.h"
 #include "recon/pipeline.h"
+#include "studies/measure.h"
 #include "validate/evaluate.h"
 
 namespace rugae {
@@ -57,13 +59,52 @@ Motion make_motion(const FrameSource& frames, const ReconOptions& options, const
   return motion;
 }
 
+// What the reconstruction is told of the lens.
+struct ToldLens {
+  fs::path file;  // empty: the dataset's own, which is the true one
+  json metrics = json::object();
+};
+
+ToldLens make_lens(const Variant& variant, const Cell& cell, const CellFiles& files,
+                   Progress& progress) {
+  ToldLens told;
+  if (!files.calibration.empty()) {
+    const fs::path out = files.calibration.parent_path().parent_path();
+    const CalibratedLens made = calibrated_lens(calibration_of(variant, cell), out, progress);
+    told = {made.file, made.metrics};
+  }
+  if (files.lens.empty()) return told;
+  const Lens right = Observations::open(files.dataset, told.file).lens();
+  make_folder(files.lens.parent_path());
+  write_atomic(files.lens, lens_yaml(perturbed(right, variant.lens_error), "wrong on purpose"));
+  told.file = files.lens;
+  return told;
+}
+
+json measured(const StudyOptions& study, const Variant& variant, const Cell& cell,
+              const CellFiles& files, Progress& progress) {
+  const PreprocessOptions& preprocess = variant.recon.preprocess;
+  if (study.measure == Measure::reflections)
+    return measure_reflections(files.dataset, {.reflections = preprocess.reflections}, progress);
+  if (study.measure == Measure::vignetting)
+    return measure_vignetting(files.dataset, {.preprocess = preprocess}, progress);
+  FeatureMeasureOptions options;
+  options.step = study.features.step;
+  options.stride = study.features.stride;
+  options.seed = cell.seed;
+  for (const FeatureMethod method : kFeatureMethods)
+    if (name_of(method) == cell.method)
+      return measure_features(files.dataset, method, options, progress);
+  fail("'{}' is no feature method", cell.method);
+}
+
 void reconstruct_in_halves(const Variant& variant, const Cell& cell, const CellFiles& files,
-                           Progress& progress) {
+                           const fs::path& lens, Progress& progress) {
   ReconOptions options = variant.recon;
   options.method = cell.method;
   options.seed = cell.seed;
   progress.begin("preprocessing");
-  const Observations observations = Observations::open(files.frames);
+  const Observations observations = Observations::open(files.frames, lens);
   const FrameSource frames(observations, options.preprocess);
   const Stages stages = stages_with(variant.replace, files.dataset, observations.lens());
   const Motion motion = make_motion(frames, options, stages, files.motion, progress);
@@ -87,6 +128,12 @@ std::optional<std::string> make_estimate(const std::function<void()>& method,
   return std::nullopt;
 }
 
+void write_metrics(const CellFiles& files, json metrics) {
+  metrics["simulation"] = read_json(simulation_of(files.dataset));
+  make_folder(files.metrics.parent_path());
+  write_atomic(files.metrics, metrics.dump(1) + "\n");
+}
+
 }  // namespace
 
 void make_cell(const StudyOptions& study, const Cell& cell, const CellFiles& files,
@@ -95,12 +142,18 @@ void make_cell(const StudyOptions& study, const Cell& cell, const CellFiles& fil
   make_dataset(variant, cell, files.scene, files.dataset, progress);
   if (files.frames != files.dataset)
     make_dataset(with_clean_frames(variant), cell, files.scene, files.frames, progress);
+  if (study.measure != Measure::loop) {
+    write_metrics(files, measured(study, variant, cell, files, progress));
+    return;
+  }
   const ExternalMethod* const command = study.command_of(cell.method);
+  ToldLens lens;
   const auto method = [&] {
+    lens = make_lens(variant, cell, files, progress);
     if (command)
-      reconstruct_by(*command, files.dataset, files.estimate, progress);
+      reconstruct_by(*command, files.frames, lens.file, files.estimate, progress);
     else
-      reconstruct_in_halves(variant, cell, files, progress);
+      reconstruct_in_halves(variant, cell, files, lens.file, progress);
   };
   if (const auto gave_up = make_estimate(method, files.estimate, progress)) {
     // A program may be mended; ours gives up on the same frames each time.
@@ -108,9 +161,9 @@ void make_cell(const StudyOptions& study, const Cell& cell, const CellFiles& fil
     return;
   }
   json metrics = evaluate(files.dataset, files.estimate, progress);
-  metrics["simulation"] = read_json(simulation_of(files.dataset));
-  make_folder(files.metrics.parent_path());
-  write_atomic(files.metrics, metrics.dump(1) + "\n");
+  if (lens.metrics.empty()) lens = make_lens(variant, cell, files, progress);  // of an earlier run
+  metrics.update(lens.metrics);
+  write_metrics(files, metrics);
 }
 
 void write_failure(const CellFiles& files, const std::string& reason, bool try_again) {

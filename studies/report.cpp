@@ -152,30 +152,50 @@ std::string cell_chapters(const CellView& view) {
          chapter("All numbers", "Dashes stand for what could not be measured.", tables_part(view));
 }
 
-// The chapters of all cells that the study wants shown; those of a single one without a fold.
-std::string cells_part(const std::vector<StudyPart>& parts, std::string& head_cards,
-                       std::string& cover, std::string& lede_text) {
-  std::string out;
-  const bool many = all_cells(parts).size() > 1;
+bool has_loop(const StudyPart& part) { return part.options.measure == Measure::loop; }
+
+std::vector<CellResult> loop_cells(const std::vector<StudyPart>& parts) {
+  std::vector<CellResult> cells;
   for (const StudyPart& part : parts)
+    if (has_loop(part)) cells.insert(cells.end(), part.cells.begin(), part.cells.end());
+  return cells;
+}
+
+Estimate estimate_of(const CellResult& cell) {
+  const bool there = fs::exists(EstimateLayout{cell.estimate}.info());
+  return cell.metrics.contains("failed") || !there ? Estimate{} : read_estimate(cell.estimate);
+}
+
+// The head of the page: of the first cell, where there is one of the whole loop.
+void fill_head(const std::vector<StudyPart>& parts, std::map<std::string, std::string>& values) {
+  std::vector<CellResult> cells = loop_cells(parts);
+  const bool loop = !cells.empty();
+  if (!loop) cells = all_cells(parts);
+  const Truth truth = Truth::open(cells[0].dataset);
+  const Estimate estimate = estimate_of(cells[0]);
+  const bool many = cells.size() > 1;
+  const CellView view{cells[0], truth, estimate, many};
+  values["cover"] = cover_picture(view);
+  values["lede"] = lede(parts, view);
+  values["cards"] = loop && !many ? headline_cards(view) : "";
+}
+
+// The chapters of all cells that the study wants shown; those of a single one without a fold.
+std::string cells_part(const std::vector<StudyPart>& parts) {
+  std::string out;
+  const bool many = loop_cells(parts).size() > 1;
+  for (const StudyPart& part : parts) {
+    if (!part.options.details || !has_loop(part)) continue;
     for (const CellResult& cell : part.cells) {
-      const bool first = lede_text.empty();
-      if (!part.options.details && !first) continue;
       const Truth truth = Truth::open(cell.dataset);
-      const bool failed = cell.metrics.contains("failed");
-      const Estimate estimate = failed ? Estimate{} : read_estimate(cell.estimate);
+      const Estimate estimate = estimate_of(cell);
       const CellView view{cell, truth, estimate, many};
-      if (first) {
-        cover = cover_picture(view);
-        lede_text = lede(parts, view);
-        if (!many) head_cards = headline_cards(view);
-      }
-      if (!part.options.details) continue;
       if (!many) return cell_chapters(view);
       out += fmt::format("<details class=\"cell\" id=\"{}\"><summary>{}</summary>\n",
                          html::escape(cell.cell.name()), html::escape(cell.cell.title())) +
              headline_cards(view) + cell_chapters(view) + "</details>\n";
     }
+  }
   return out;
 }
 
@@ -196,9 +216,11 @@ std::string report_html(const Study& study, const std::vector<StudyPart>& parts)
   const std::string page = read_text(file);
   std::map<std::string, std::string> values;
   values["title"] = html::escape(study.title);
-  values["cells"] = cells_part(parts, values["cards"], values["cover"], values["lede"]);
+  fill_head(parts, values);
+  values["cells"] = cells_part(parts);
   values["summaries"] = summaries_part(parts);
-  values["overview"] = cells.size() > 1 ? overview_part(cells) : "";
+  const std::vector<CellResult> loop = loop_cells(parts);
+  values["overview"] = loop.size() > 1 ? overview_part(loop) : "";
   values["gates"] = gates_part(all_gates(parts));
   std::string texts = study.text;
   if (parts.size() > 1)

@@ -57,6 +57,7 @@ std::set<fs::path> shared_parts(const CellJob& job) {
   for (const fs::path& dataset : {job.files.dataset, job.files.frames})
     if (!dataset_finished(dataset)) parts.insert(dataset);
   if (!job.files.motion.empty() && !fs::exists(job.files.motion)) parts.insert(job.files.motion);
+  if (!job.files.calibration.empty()) parts.insert(job.files.calibration);
   parts.insert(job.files.metrics);
   return parts;
 }

@@ -8,6 +8,7 @@
 #include "core/files.h"
 #include "core/presets.h"
 #include "core/yaml.h"
+#include "recon/features.h"
 
 namespace rugae {
 namespace {
@@ -100,7 +101,41 @@ std::vector<ExternalMethod> read_commands(YamlReader& study, const std::string& 
   return commands;
 }
 
+void read_measure(YamlReader& yaml, StudyOptions& study) {
+  int measure = 0;
+  yaml.get_choice("measure", measure_names(), measure);
+  study.measure = static_cast<Measure>(measure);
+  auto features = yaml.child("features");
+  if (!features) return;
+  check(study.measure == Measure::features, "{}: features, expected measure: features beside it",
+        yaml.where("features"));
+  for (const auto& [key, value] :
+       {std::pair("step", &study.features.step), std::pair("stride", &study.features.stride)}) {
+    features->get(key, *value);
+    check(*value >= 1, "{}: {} is {}, expected at least 1", features->where(key), key, *value);
+  }
+  features->finish();
+}
+
+// Feature methods where these are measured; and the paper's stages have one method.
+void read_measured_methods(YamlReader& yaml, StudyOptions& study) {
+  std::vector<std::string> known{"paper"};
+  if (study.measure == Measure::features) {
+    known.clear();
+    for (const FeatureMethod method : kFeatureMethods) known.push_back(name_of(method));
+  }
+  study.methods = known;
+  yaml.get("methods", study.methods);
+  for (const std::string& method : study.methods)
+    check(std::ranges::count(known, method) > 0, "{}: method is '{}', expected one of: {}{}",
+          yaml.where("methods"), method, fmt::join(known, ", "), did_you_mean(method, known));
+}
+
 void read_methods(YamlReader& yaml, const ReconOptions& recon, StudyOptions& study) {
+  if (study.measure != Measure::loop) {
+    read_measured_methods(yaml, study);
+    return;
+  }
   study.methods = {recon.method};
   yaml.get("methods", study.methods);
   check(!study.methods.empty(), "{}: methods is empty, expected at least one",
@@ -124,6 +159,11 @@ void read_methods(YamlReader& yaml, const ReconOptions& recon, StudyOptions& stu
 
 }  // namespace
 
+const std::vector<std::string>& measure_names() {
+  static const std::vector<std::string> kNames = {"loop", "features", "reflections", "vignetting"};
+  return kNames;
+}
+
 const ExternalMethod* StudyOptions::command_of(const std::string& method) const {
   const auto at = std::ranges::find(commands, method, &ExternalMethod::name);
   return at == commands.end() ? nullptr : &*at;
@@ -139,6 +179,7 @@ StudyOptions read_part_text(const std::string& text, const std::string& name) {
   read_names(yaml, "cameras", "camera", study.cameras);
   read_names(yaml, "trajectories", "trajectory", study.trajectories);
   read_seeds(yaml, study.seeds);
+  read_measure(yaml, study);
   study.commands = read_commands(yaml, name);
   read_methods(yaml, base.recon, study);
   const std::vector<Axis> axes = read_axes(yaml);

@@ -21,6 +21,16 @@ struct Gate {
   std::vector<Setting> settings;           // those it names must be the cell's
 };
 
+/// What a cell is: the whole loop, or a single stage of it against the truth (studies/measure.h).
+enum class Measure { loop, features, reflections, vignetting };
+const std::vector<std::string>& measure_names();
+
+/// Which pairs of frames features are measured on.
+struct FeaturePairs {
+  int step = 1;    // pairs (i, i + step)
+  int stride = 1;  // of every so many frames i
+};
+
 /// Keys of the file have the same names; `frames`, `scene`, `resolution` and `render` go to
 /// `simulate`.
 struct StudyOptions {
@@ -32,7 +42,9 @@ struct StudyOptions {
   std::vector<Variant> variants{1};      // at least one
   std::vector<Gate> gates;
   SummarySpecs summaries;
-  bool details = true;  // of each cell in the report, not its row in the tables alone
+  Measure measure = Measure::loop;  // of features the methods are feature methods
+  FeaturePairs features;
+  bool details = true;  // of each cell in the report, not its row in the tables alone; of the loop
   std::string text;     // as it was read
 
   /// Null for a method of ours.

@@ -111,6 +111,15 @@ Variant read_variant(YamlReader& study, const std::string& study_file) {
   int replace = 0;
   study.get_choice("replace", replace_names(), replace);
   variant.replace = static_cast<Replace>(replace);
+  study.get("calibrate", variant.calibrate);
+  study.get("lens_error", variant.lens_error);
+  check(variant.lens_error > -0.5 && variant.lens_error < 0.5,
+        "{}: lens_error is {}, expected -0.5 to 0.5", study.where("lens_error"),
+        variant.lens_error);
+  if (variant.replace == Replace::lens) {
+    variant.calibrate = false;
+    variant.lens_error = 0.0;
+  }
   variant.simulate.check();
   return variant;
 }

@@ -20,13 +20,16 @@ struct Variant {
                            // it builds on
   ReconOptions recon;      // method and seed are those of the cell
   Replace replace = Replace::nothing;
+  bool calibrate = false;   // the lens is what boards tell of it, not the true one
+  double lens_error = 0.0;  // and is wrong by this share on purpose: perturbed()
 };
 
 /// The same without what spoils frames: noise, highlights, vignetting and blur.
 Variant with_clean_frames(Variant variant);
 
 /// Reads the keys `scene` (a preset, a file, or a mapping as in a scene file), `resolution`,
-/// `frames`, `render`, `recon` and `replace`. `study_file` is where paths of the scene go from.
+/// `frames`, `render`, `recon`, `calibrate`, `lens_error` and `replace`. `study_file` is where
+/// paths of the scene go from.
 Variant read_variant(YamlReader& study, const std::string& study_file);
 
 /// The variants of a study's text: one for each combination of its axes. An axis can set whatever
