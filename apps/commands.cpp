@@ -50,6 +50,8 @@ void add_simulate(CLI::App& app) {
       .add_option("--frames", a->options.frames,
                   "Frames over the whole path; 0: as many as in the paper")
       ->capture_default_str();
+  command.add_option("--first", a->options.first,
+                     "Only the first so many of them, at the same pace; 0: all");
   command.add_option("--only-frame", a->options.only_frame, "Render this frame alone");
   command.add_option("--seed", a->options.seed, "Draws the stomach, the path and the noise")
       ->capture_default_str();

@@ -10,7 +10,7 @@ namespace rugae {
 
 /// `settings` (a JSON object) with the scene's resolved text in it under "scene_yaml": a scene file
 /// that was edited between two runs makes another dataset. Throws Error when it is not JSON.
-std::string with_scene(const std::string& settings, const Scene& scene);
+std::string with_scene(const std::string& settings, const Scene& scene, int first_of = 0);
 
 /// Writes scene.yaml, regions.csv and instances.csv into the dataset's truth folder.
 void write_scene_truth(const Scene& scene, const std::filesystem::path& truth_folder);

@@ -30,7 +30,16 @@ struct Path {
   PoseTrack track;
   CameraPath between;  // the frames too
   double length_mm = 0.0, min_clearance_mm = 0.0;
+  int first_of = 0;  // the track is the first part of so many frames; 0: all of them
 };
+
+Path first_part(Path path, int first) {
+  if (first <= 0 || first >= static_cast<int>(path.track.size())) return path;
+  path.first_of = static_cast<int>(path.track.size());
+  path.track.resize(static_cast<std::size_t>(first));
+  path.length_mm = length_mm(path.track);
+  return path;
+}
 
 // As many frames as the paper has for this camera and trajectory, or as the track in a file has
 // poses, or as a stop-motion has views; a path that is none of these is taken for as long as the
@@ -96,9 +105,11 @@ Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajecto
   };
   for (TimedPose& pose : track) pose.world_from_camera = mounted(pose.world_from_camera);
   const double last = frames - 1.0;
-  return {std::move(track),
-          [path, last, mounted](double frame) { return mounted(sampled_pose(path, frame / last)); },
-          path.length_mm(), path.min_clearance_mm()};
+  return first_part(
+      {std::move(track),
+       [path, last, mounted](double frame) { return mounted(sampled_pose(path, frame / last)); },
+       path.length_mm(), path.min_clearance_mm()},
+      options.first);
 }
 
 // Where nothing moves while a frame is taken, all rows see the same.
@@ -117,7 +128,7 @@ LensSampling lens_sampling(const LensSettings& lens, const Camera& camera, std::
   return sampling;
 }
 
-DatasetInfo info_of(const SimulateOptions& options, int frames, const Camera& camera,
+DatasetInfo info_of(const SimulateOptions& options, const Path& path, const Camera& camera,
                     const Scene& scene) {
   DatasetInfo info;
   info.scene = options.scene;
@@ -125,7 +136,7 @@ DatasetInfo info_of(const SimulateOptions& options, int frames, const Camera& ca
   info.trajectory = options.trajectory;
   info.resolution = options.resolution;
   info.seed = options.seed;
-  info.frames = frames;
+  info.frames = static_cast<int>(path.track.size());
   const OutputSettings& output = options.render.output;
   info.images = {output.frames == FrameFormat::jpeg,
                  output.jpeg_quality,
@@ -138,7 +149,7 @@ DatasetInfo info_of(const SimulateOptions& options, int frames, const Camera& ca
   info.truth = {options.render.wanted_labels(), row_time_s(options.render, camera, scene) > 0.0,
                 static_cast<bool>(scene.motion), labels && truth.tracks > 0,
                 labels && truth.coverage};
-  info.text = with_scene(settings_json(options.render), scene);
+  info.text = with_scene(settings_json(options.render), scene, path.first_of);
   return info;
 }
 
@@ -147,6 +158,7 @@ DatasetInfo info_of(const SimulateOptions& options, int frames, const Camera& ca
 void SimulateOptions::check() const {
   render.check();
   rugae::check(frames == 0 || frames >= 2, "frames is {}, expected at least 2", frames);
+  rugae::check(first == 0 || first >= 2, "first is {}, expected at least 2", first);
   rugae::check(only_frame >= -1, "only-frame is {}, expected at least 0", only_frame);
   rugae::check(threads >= 0, "threads is {}, expected at least 0", threads);
   rugae::check(frames == 0 || only_frame < frames, "only-frame is {}, but there are {} frames",
@@ -191,7 +203,7 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
 
   const bool whole = options.only_frame < 0;
   std::map<int, FrameExposure> exposures = ExposureLog::read(out);
-  DatasetWriter writer(out, info_of(options, frames, camera, scene));
+  DatasetWriter writer(out, info_of(options, path, camera, scene));
   writer.write_scene(camera, path.track, scene.wall);
   write_scene_truth(scene, writer.layout().truth());
   const ExposureControl control(camera.sensor, options.render.sensor);

@@ -17,6 +17,7 @@ struct SimulateOptions {
   std::string trajectory = "1";         // preset or YAML
   std::string resolution = "medium";
   int frames = 0;       // 0: as many as in the paper for this camera and trajectory, or in the file
+  int first = 0;        // only the first so many of these, at the same pace; 0: all
   int only_frame = -1;  // replays a single frame
   std::uint64_t seed = 1;
   int threads = 0;  // 0: all

@@ -42,6 +42,7 @@ json dataset_key(const Variant& variant, const Cell& cell) {
           {"trajectory", preset_hash("trajectories", "trajectory", cell.trajectory)},
           {"resolution", s.resolution},
           {"frames", s.frames},
+          {"first", s.first},
           {"seed", cell.seed},
           {"render", json::parse(settings_json(s.render))}};
 }
@@ -95,8 +96,7 @@ CellFiles files_of(const StudyOptions& study, const Cell& cell, const fs::path& 
   files.dataset = files.frames = dataset(data_key);
   if (!variant.scene_text.empty())
     files.scene = out / "scenes" / (short_hash(variant.scene_text) + ".yaml");
-  json key = {{"dataset", data_key},
-              {"replace", replace_names()[static_cast<std::size_t>(variant.replace)]}};
+  json key = {{"dataset", data_key}};
   if (variant.replace == Replace::frames) {
     const json clean_key = dataset_key(with_clean_frames(variant), cell);
     files.frames = dataset(clean_key);
@@ -124,8 +124,12 @@ CellFiles files_of(const StudyOptions& study, const Cell& cell, const fs::path& 
     ReconOptions recon = variant.recon;
     recon.method = cell.method;
     recon.seed = cell.seed;
+    const auto replaced = [](Replace r) { return replace_names()[static_cast<std::size_t>(r)]; };
+    const bool deep = variant.replace == Replace::depth;  // the motion is ours
+    key["replace"] = replaced(deep ? Replace::nothing : variant.replace);
     key["recon"] = to_json_text(motion_options(recon));
     files.motion = out / "motions" / fmt::format("{}_{}.cbor", where, short_hash(key));
+    key["replace"] = replaced(variant.replace);
     key["recon"] = to_json_text(recon);
   }
   const std::string name = fmt::format("{}_{}_{}", where, cell.method, short_hash(key));

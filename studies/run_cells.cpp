@@ -47,7 +47,9 @@ double weight_of(const CellJob& job) {
   constexpr int kTrajectories = 6;   // in the paper
   const Camera camera = load_camera(job.cell.camera);
   const int asked = job.study->variants[job.cell.variant].simulate.frames;
-  const int frames = asked > 0 ? asked : camera.frames_in_paper / kTrajectories;
+  const int whole = asked > 0 ? asked : camera.frames_in_paper / kTrajectories;
+  const int first = job.study->variants[job.cell.variant].simulate.first;
+  const int frames = first > 0 ? std::min(first, whole) : whole;
   return frames * (pixels_of(camera) + kOfAFrame);
 }
 

@@ -104,6 +104,7 @@ Variant read_variant(YamlReader& study, const std::string& study_file) {
   read_scene(study, study_file, variant);
   study.get("resolution", variant.simulate.resolution);
   study.get("frames", variant.simulate.frames);
+  study.get("first", variant.simulate.first);
   if (auto render = study.child("render")) read_settings(*render, variant.simulate.render);
   check(variant.simulate.frames >= 0, "{}: frames is {}, expected at least 0 (0: as in the paper)",
         study.where("frames"), variant.simulate.frames);

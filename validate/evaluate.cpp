@@ -45,18 +45,21 @@ json tracking_json(const PoseErrors& poses, const Estimate& estimate) {
 }
 
 json time_json(const Estimate& estimate) {
-  json stages = json::array();
+  json stages = json::array(), stage_s = json::object();
   double seconds = 0.0, peak_mb = 0.0;
   for (const StageTime& stage : estimate.stages) {
     stages.push_back(
         {{"name", stage.name}, {"seconds", stage.seconds}, {"peak_rss_mb", stage.peak_rss_mb}});
+    stage_s[stage.name] = stage.seconds;
     seconds += stage.seconds;
     peak_mb = std::max(peak_mb, stage.peak_rss_mb);
   }
   const auto frames = static_cast<double>(estimate.states.size());
   return {{"reconstruct_s", seconds},
+          {"pair_s", frames > 1.0 ? json(seconds / (frames - 1.0)) : json()},
           {"frames_per_s", seconds > 0.0 ? json(frames / seconds) : json()},
           {"peak_rss_mb", peak_mb},
+          {"stage_s", stage_s},
           {"stages", stages}};
 }
 

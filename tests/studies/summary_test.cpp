@@ -109,7 +109,7 @@ TEST(Summary, ThePageHasOursAndThePublished) {
 TEST(Published, NumbersOfThePaper) {
   EXPECT_DOUBLE_EQ(published("ate", "6", "awaiba-naneye").value(), 87.3);
   EXPECT_DOUBLE_EQ(published("map_preprocessing", "1", "NPR").value(), 54.5);
-  EXPECT_EQ(published("features", "orb", "potensic-mini"), 0.35);
+  EXPECT_EQ(published("features", "ORB", "potensic-mini"), 0.35);
   EXPECT_EQ(published("map", "4", "potensic-mini"), std::nullopt);
   EXPECT_EQ(published("none", "1", "misumi-v5506"), std::nullopt);
   EXPECT_EQ(number_in("1.5"), 1.5);
