@@ -47,11 +47,16 @@ double as_number(const std::string& name, const std::string& key, const YAML::No
   return value;
 }
 
+void set_flow_style(YAML::Node node) {
+  node.SetStyle(YAML::EmitterStyle::Flow);
+  for (const auto& entry : node) set_flow_style(node.IsMap() ? entry.second : YAML::Node(entry));
+}
+
 std::string one_line(const YAML::Node& node) {
   if (node.IsScalar()) return node.Scalar();
-  YAML::Emitter out;
-  out << YAML::Flow << node;
-  std::string text = out.c_str();
+  YAML::Node flow = YAML::Clone(node);
+  if (!flow.IsNull()) set_flow_style(flow);
+  std::string text = YAML::Dump(flow);
   std::ranges::replace(text, '\n', ' ');  // long flows are broken into lines
   return text;
 }

@@ -74,6 +74,22 @@ TEST(Yaml, ChoicesOfferTheNearest) {
             "'kannala_brandt'?");
 }
 
+// A value as text goes back into another document, however it was written.
+TEST(Yaml, ValuesAsTextAndBack) {
+  auto yaml = YamlReader::from_text(
+      "a: 1.50\nb: {c: [1, 2], d: {e: true}}\nf:\n  - g: 1\n    h: [x, y]\n  - 7\n", "s.yaml");
+  EXPECT_EQ(yaml.text("a"), "1.50");
+  EXPECT_EQ(yaml.text("b"), "{c: [1, 2], d: {e: true}}");
+  EXPECT_EQ(yaml.text("f"), "[{g: 1, h: [x, y]}, 7]");
+  EXPECT_EQ(yaml.text("none"), "");
+  EXPECT_EQ(yaml.texts("f"), (std::vector<std::string>{"{g: 1, h: [x, y]}", "7"}));
+  auto changed = YamlReader::from_text(
+      yaml_with(yaml_with("k: 1\n", "l.m", yaml.text("f")), "k", "no"), "t.yaml");
+  EXPECT_EQ(changed.text("k"), "no");
+  EXPECT_EQ(changed.text("l"), "{m: [{g: 1, h: [x, y]}, 7]}");
+  EXPECT_EQ(message_of([] { yaml_with("k: 1\n", "k.m", "2"); }), "'k' is '1', expected a mapping");
+}
+
 TEST(Yaml, MissingTwiceAndBroken) {
   auto yaml = YamlReader::from_text("a: 1\n", "s.yaml");
   int value = 0;
