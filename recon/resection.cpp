@@ -167,15 +167,20 @@ std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
   const std::vector<std::vector<Seen>> seen = points_seen(structure);
   using Shared = std::shared_ptr<const AlignImage>;
   Cache<Shared> references(kReferencesHeld);
-  const auto prepared = [&](int frame) {
+  const auto reference_at = [&](int frame) {
     return std::make_shared<const AlignImage>(
         prepare_alignment(frames.pose_frame(frame), align_options));
+  };
+  // No point starts in the frame to be placed: its reflections need not be known.
+  const cv::Mat none = cv::Mat::zeros(frames.valid().size(), CV_8U);
+  const auto moving_at = [&](int frame) {
+    return prepare_alignment({frame, frames.gray(frame), {}, none, frames.valid()}, align_options);
   };
   for (std::size_t begin = 0; begin < rest.size(); begin += kFramesAtOnce) {
     const std::size_t end = std::min(rest.size(), begin + kFramesAtOnce);
     tbb::parallel_for(begin, end, [&](std::size_t i) {
       const int f = rest[i];
-      const Shared moving = prepared(f);
+      const AlignImage moving = moving_at(f);
       const auto after = static_cast<std::size_t>(
           std::lower_bound(placed_frames.begin(), placed_frames.end(), f) - placed_frames.begin());
       // Between two key frames the pose is thought to lie on the way from one to the other; the
@@ -195,9 +200,9 @@ std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
         const std::vector<Seen>& points = seen[placed_keyframes[anchor]];
         if (static_cast<int>(points.size()) < kMinPoints) continue;
         const int key = placed_frames[anchor];
-        const Shared reference = references.get(key, [&] { return prepared(key); });
+        const Shared reference = references.get(key, [&] { return reference_at(key); });
         const Sighted sighted =
-            follow(frames.lens(), points, *reference, *moving, expected, align_options, seed);
+            follow(frames.lens(), points, *reference, moving, expected, align_options, seed);
         const auto p = place_by_points(sighted.points, sighted.rays, focal_px, options);
         if (!p) continue;
         poses[f] = p->cam_from_world;
