@@ -1,6 +1,7 @@
 #include "recon/align.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -52,9 +53,8 @@ cv::Mat usable_pixels(const Frame& frame) {
 }
 
 // The most textured pixel of each cell: where the flow is measured best.
-std::vector<Vec2> grid_points(const Frame& frame, const cv::Mat& usable, int cell_px) {
-  cv::Mat gray, texture;
-  frame.gray.convertTo(gray, CV_32F, 1.0 / 255.0);
+std::vector<Vec2> grid_points(const cv::Mat& gray, const cv::Mat& usable, int cell_px) {
+  cv::Mat texture;
   cv::cornerMinEigenVal(gray, texture, 7, 3);
   std::vector<Vec2> points;
   for (int y0 = kBorderPx; y0 + cell_px + kBorderPx <= gray.rows; y0 += cell_px) {
@@ -103,32 +103,29 @@ Mat3 from_cv(const cv::Mat& m) {
   return out;
 }
 
+// The flow is measured on images this many times smaller; the rest of the division is cut off.
+int flow_shrink(const cv::Mat& image) { return std::max(1, image.cols / kFlowWidthPx); }
+
+cv::Mat shrunk(const cv::Mat& image) {
+  const int shrink = flow_shrink(image);
+  const cv::Size size(image.cols / shrink, image.rows / shrink);
+  const cv::Rect whole(0, 0, size.width * shrink, size.height * shrink);
+  cv::Mat small;
+  cv::resize(image(whole), small, size, 0, 0, cv::INTER_AREA);
+  return small;
+}
+
 // Matches that come back within the tolerance: forward flow at the points, backward flow at their
 // images.
-std::vector<Match> match(const Frame& reference, const Frame& moving, const AlignOptions& options,
-                         double scale, const AlignGuess& guess) {
-  const int shrink = std::max(1, reference.gray.cols / kFlowWidthPx);
-  const cv::Size size(reference.gray.cols / shrink, reference.gray.rows / shrink);
-  const cv::Rect whole(0, 0, size.width * shrink, size.height * shrink);
-  const auto shrunk = [&](const cv::Mat& image) {
-    cv::Mat small;
-    cv::resize(image(whole), small, size, 0, 0, cv::INTER_AREA);
-    return small;
-  };
-  const cv::Mat ref = shrunk(reference.gray), mov = shrunk(moving.gray);
-  cv::Mat initial;
-  if (!guess.flow.empty()) initial = shrunk(guess.flow) / shrink;
-  const cv::Mat seen = shrunk(reference.valid & moving.valid) == 255;
-  const cv::Mat forward = farneback_flow(ref, mov, initial, seen);
-  const cv::Mat backward =
-      farneback_flow(mov, ref, initial.empty() ? initial : cv::Mat(-forward), seen);
-
-  const double radius_px = options.patch_radius_px * scale;
-  const cv::Mat usable = usable_pixels(reference) & patch_inside(reference.valid, radius_px),
-                landing = patch_inside(moving.valid, radius_px);
+std::vector<Match> match(const AlignImage& reference, const AlignImage& moving,
+                         const AlignOptions& options, double scale, const AlignGuess& guess) {
+  const int shrink = flow_shrink(reference.gray);
+  const auto [forward, backward] =
+      guess.measured.forward.empty() ? measure_flow(reference, moving, guess.flow) : guess.measured;
+  const cv::Mat &usable = reference.usable, &landing = moving.landing;
   const int cell_px = std::max(2, static_cast<int>(std::lround(options.grid_px * scale)));
   const std::vector<Vec2> points = guess.reference_points.empty()
-                                       ? grid_points(reference, usable, cell_px)
+                                       ? grid_points(reference.intensity, usable, cell_px)
                                        : guess.reference_points;
   std::vector<Match> matches;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -185,19 +182,20 @@ std::optional<Mat3> take_homography(std::vector<Match>& matches, double threshol
 // The inliers of one homography, each refined on its own patch of the paper's radius: on rendered
 // frames it halves the flow's error, where a patch of half that radius takes off a quarter. Where
 // the sharp patch does not fix the place the smoothed one is tried, at a third of its accuracy.
-void refine(const PatchPair& sharp, const PatchPair& smooth, const std::vector<Match>& inliers,
-            double radius_px, bool indexed, PairAlignment& result) {
+void refine(const AlignImage& reference, const AlignImage& moving,
+            const std::vector<Match>& inliers, double radius_px, bool indexed,
+            PairAlignment& result) {
   PointRefinementOptions options;
   options.radius_px = radius_px;
   options.min_correlation = kMinCorrelation;
+  const PointRefiner refiner(options);
   std::vector<std::optional<Vec2>> refined(inliers.size());
   tbb::parallel_for(std::size_t{0}, inliers.size(), [&](std::size_t i) {
     const Match& m = inliers[i];
-    for (const PatchPair* pair : {&sharp, &smooth}) {
-      refined[i] = refine_point(pair->reference, pair->moving, m.reference_px, m.moving_px,
-                                m.linear, options);
-      if (refined[i]) return;
-    }
+    refined[i] =
+        refiner(reference.intensity, moving.intensity, m.reference_px, m.moving_px, m.linear);
+    if (!refined[i])
+      refined[i] = refiner(reference.smooth, moving.smooth, m.reference_px, m.moving_px, m.linear);
   });
   for (std::size_t i = 0; i < inliers.size(); ++i) {
     if (!refined[i]) continue;
@@ -208,8 +206,8 @@ void refine(const PatchPair& sharp, const PatchPair& smooth, const std::vector<M
 }
 
 // The affine over the patches at the inliers, started at their mean flow.
-void fit(PatchPair& pair, const std::vector<Match>& inliers, const AlignOptions& options,
-         double scale, PairAlignment& result) {
+void fit(const AlignImage& reference, const AlignImage& moving, const std::vector<Match>& inliers,
+         const AlignOptions& options, double scale, PairAlignment& result) {
   std::vector<Vec2> reference_px, moving_px;
   Vec2 mean_flow = Vec2::Zero();
   for (const Match& m : inliers) {
@@ -218,6 +216,7 @@ void fit(PatchPair& pair, const std::vector<Match>& inliers, const AlignOptions&
     mean_flow += (m.reference_px - m.moving_px) / static_cast<double>(inliers.size());
   }
   const double radius_px = options.patch_radius_px * scale;
+  PatchPair pair{reference.intensity, moving.intensity, {}, {}};
   pair.reference_patches = circular_patches(reference_px, radius_px, pair.reference.size());
   pair.moving_patches = circular_patches(moving_px, radius_px, pair.moving.size());
   Affine2 start = Affine2::Identity();
@@ -231,7 +230,37 @@ void fit(PatchPair& pair, const std::vector<Match>& inliers, const AlignOptions&
 
 }  // namespace
 
-std::optional<PairAlignment> align(const Frame& reference, const Frame& moving,
+AlignImage prepare_alignment(const Frame& frame, const AlignOptions& options) {
+  AlignImage image;
+  image.index = frame.index;
+  image.gray = frame.gray;
+  frame.gray.convertTo(image.intensity, CV_32F, 1.0 / 255.0);
+  cv::GaussianBlur(image.intensity, image.smooth, {}, kSmoothingPx);
+  const double radius_px = options.patch_radius_px * frame.gray.cols / kReferenceWidthPx;
+  image.landing = patch_inside(frame.valid, radius_px);
+  image.usable = usable_pixels(frame) & image.landing;
+  image.flow = prepare_flow(shrunk(frame.gray), shrunk(frame.valid) == 255);
+  return image;
+}
+
+PairFlow measure_flow(const AlignImage& reference, const AlignImage& moving, const cv::Mat& guess) {
+  cv::Mat initial;
+  if (!guess.empty()) initial = shrunk(guess) / flow_shrink(guess);
+  PairFlow flow;
+  const auto forward = [&] { flow.forward = farneback_flow(reference.flow, moving.flow, initial); };
+  const auto backward = [&](const cv::Mat& start) {
+    flow.backward = farneback_flow(moving.flow, reference.flow, start);
+  };
+  if (initial.empty()) {
+    tbb::parallel_invoke(forward, [&] { backward({}); });
+  } else {
+    forward();
+    backward(-flow.forward);
+  }
+  return flow;
+}
+
+std::optional<PairAlignment> align(const AlignImage& reference, const AlignImage& moving,
                                    const AlignOptions& options, std::uint64_t seed,
                                    const AlignGuess& guess) {
   const double scale = reference.gray.cols / kReferenceWidthPx;
@@ -242,12 +271,6 @@ std::optional<PairAlignment> align(const Frame& reference, const Frame& moving,
   result.reference = reference.index;
   result.moving = moving.index;
   result.matches = static_cast<int>(matches.size());
-  PatchPair pair;
-  reference.gray.convertTo(pair.reference, CV_32F, 1.0 / 255.0);
-  moving.gray.convertTo(pair.moving, CV_32F, 1.0 / 255.0);
-  PatchPair smooth;
-  cv::GaussianBlur(pair.reference, smooth.reference, {}, kSmoothingPx);
-  cv::GaussianBlur(pair.moving, smooth.moving, {}, kSmoothingPx);
   for (int plane = 0; plane < kMaxPlanes && matches.size() >= enough; ++plane) {
     const auto word =
         random_words(seed, Purpose::recon_ransac, static_cast<std::uint32_t>(reference.index),
@@ -260,14 +283,21 @@ std::optional<PairAlignment> align(const Frame& reference, const Frame& moving,
       const double share = static_cast<double>(inliers.size()) / result.matches;
       if (!(share >= kMinInlierShare)) return std::nullopt;
       result.ref_from_mov_homography = *h;
-      if (guess.affine) fit(pair, inliers, options, scale, result);
+      if (guess.affine) fit(reference, moving, inliers, options, scale, result);
     }
     result.inliers += static_cast<int>(inliers.size());
-    refine(pair, smooth, inliers, options.patch_radius_px * scale, !guess.reference_points.empty(),
-           result);
+    refine(reference, moving, inliers, options.patch_radius_px * scale,
+           !guess.reference_points.empty(), result);
   }
   if (result.reference_px.size() < enough) return std::nullopt;
   return result;
+}
+
+std::optional<PairAlignment> align(const Frame& reference, const Frame& moving,
+                                   const AlignOptions& options, std::uint64_t seed,
+                                   const AlignGuess& guess) {
+  return align(prepare_alignment(reference, options), prepare_alignment(moving, options), options,
+               seed, guess);
 }
 
 }  // namespace rugae

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/types.h"
+#include "recon/flow.h"
 #include "recon/options.h"
 #include "recon/preprocess/preprocess.h"
 
@@ -30,6 +31,26 @@ struct PairAlignment {
   bool converged = false;
 };
 
+/// What alignment needs of a frame, computed once and shared by all pairs the frame takes part in.
+struct AlignImage {
+  int index = -1;             // of the frame
+  cv::Mat gray;               // CV_8U
+  cv::Mat intensity, smooth;  // CV_32F, [0, 1]; smoothed: where noise hides the texture
+  cv::Mat usable, landing;    // CV_8U: where a point may start, and where it may be found
+  FlowImage flow;             // shrunk
+};
+
+AlignImage prepare_alignment(const Frame& frame, const AlignOptions& options);
+
+/// The flow of a pair, there and back, at the size of AlignImage::flow.
+struct PairFlow {
+  cv::Mat forward, backward;  // CV_32FC2, px of the shrunk images; empty: not measured
+};
+
+/// `guess` is as AlignGuess::flow.
+PairFlow measure_flow(const AlignImage& reference, const AlignImage& moving,
+                      const cv::Mat& guess = {});
+
 /// What the caller knows of a pair beforehand.
 struct AlignGuess {
   /// Follow these points of the reference (they need not be integer pixels) instead of a grid, so
@@ -37,6 +58,7 @@ struct AlignGuess {
   std::vector<Vec2> reference_points;
   cv::Mat flow;  // CV_32FC2, px, a first guess of the flow from reference to moving; may be empty
   bool affine = true;  // false: correspondences alone are wanted, no affine is fitted
+  PairFlow measured;   // the flow itself, where the caller has measured it already
 };
 
 /// Empty when the pair cannot be aligned (too few inliers). Correspondences are forward-backward
@@ -44,6 +66,11 @@ struct AlignGuess {
 /// plane cannot hold a cavity: after the first homography (the one reported) further homographies
 /// are taken from what the earlier ones left, while they find at least `min_inliers`; the inliers
 /// of all of them are returned.
+std::optional<PairAlignment> align(const AlignImage& reference, const AlignImage& moving,
+                                   const AlignOptions& options, std::uint64_t seed,
+                                   const AlignGuess& guess = {});
+
+/// Of one pair alone.
 std::optional<PairAlignment> align(const Frame& reference, const Frame& moving,
                                    const AlignOptions& options, std::uint64_t seed,
                                    const AlignGuess& guess = {});

@@ -62,7 +62,8 @@ cv::Mat border_distance(const cv::Mat& valid) {
   return distance(cv::Rect(1, 1, valid.cols, valid.rows)).clone();
 }
 
-Warped warp(const BlendInput& input, const cv::Rect& place, bool anchor) {
+/// `distance` is border_distance() of the input.
+Warped warp(const BlendInput& input, const cv::Mat& distance, const cv::Rect& place, bool anchor) {
   // OpenCV's pixel centres are whole numbers: destination pixel d is plane pixel d + 0.5 + corner.
   Mat3 plane_from_cv = Mat3::Identity(), image_from_cv = Mat3::Identity();
   plane_from_cv(0, 2) = place.x + 0.5;
@@ -79,8 +80,8 @@ Warped warp(const BlendInput& input, const cv::Rect& place, bool anchor) {
   cv::warpPerspective(input.valid, warped.valid, to_canvas, place.size(), cv::INTER_LINEAR,
                       cv::BORDER_CONSTANT, 0);
   cv::threshold(warped.valid, warped.valid, 254, 255, cv::THRESH_BINARY);
-  cv::warpPerspective(border_distance(input.valid), warped.weight, to_canvas, place.size(),
-                      cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
+  cv::warpPerspective(distance, warped.weight, to_canvas, place.size(), cv::INTER_LINEAR,
+                      cv::BORDER_CONSTANT, 0);
   if (anchor) warped.weight *= kAnchorPreference;
   warped.weight.setTo(0.0f, warped.valid == 0);
   return warped;
@@ -167,12 +168,19 @@ BlendResult blend(const std::vector<BlendInput>& inputs, const Eigen::AlignedBox
   }
   check(!canvas.empty(), "blend: no picture lies on the canvas");
   std::vector<Warped> warped;
+  cv::Mat distance;
+  std::size_t distance_of = 0;
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     if (places[i].empty()) {
       warped.emplace_back();
       continue;
     }
-    warped.push_back(warp(inputs[i], places[i], i == 0));
+    // Frames of one camera share their mask.
+    if (distance.empty() || inputs[i].valid.data != inputs[distance_of].valid.data) {
+      distance = border_distance(inputs[i].valid);
+      distance_of = i;
+    }
+    warped.push_back(warp(inputs[i], distance, places[i], i == 0));
     warped.back().place -= canvas.tl();
   }
 

@@ -2,10 +2,12 @@
 
 #include <ceres/ceres.h>
 
+#include <algorithm>
 #include <array>
 #include <limits>
 
 #include "recon/reprojection_cost.h"
+#include "recon/schur.h"
 
 namespace rugae {
 namespace {
@@ -26,8 +28,7 @@ Rigid3 from_block(const PoseBlock& b) {
 
 ceres::Solver::Options solver_options(int max_iterations, double function_tolerance) {
   ceres::Solver::Options o;
-  o.num_threads =
-      1;  // the Schur eliminator adds in the order of its threads: one thread, one order
+  o.num_threads = 1;  // one thread, one order of sums
   o.max_num_iterations = max_iterations;
   o.function_tolerance = function_tolerance;
   o.gradient_tolerance = 1e-14;   // the function tolerance decides
@@ -71,47 +72,49 @@ BundleReport bundle_adjust(Structure& structure, double focal_px, const BundleOp
     for (const int k : scope.free_keyframes) is_free[k] = structure.placed[k];
   }
 
-  ceres::Problem::Options problem_options;
-  problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  PoseManifold manifold;
-  ceres::HuberLoss loss(options.huber_px);
-  ceres::Problem problem(problem_options);
-  std::vector<PoseBlock> poses(n);
-  for (std::size_t k = 0; k < n; ++k) poses[k] = to_block(structure.cam_from_world[k]);
-
-  auto* ordering = new ceres::ParameterBlockOrdering;  // owned by the solver's options below
-  std::vector<char> used(n, 0);
+  SchurProblem problem;
+  problem.focal_px = focal_px;
+  problem.huber_px = options.huber_px;
+  std::vector<int> camera_of(n, -1), keyframe_of;  // of the problem; of the structure
+  std::vector<Track*> adjusted;
+  BundleReport report;
   for (Track& track : structure.tracks) {
     if (!track.triangulated) continue;
-    bool seen_free = false;
+    const auto counts = [&](const Track::Observation& o) {
+      return o.inlier && structure.placed[o.keyframe];
+    };
+    if (std::ranges::none_of(track.observations,
+                             [&](const auto& o) { return counts(o) && is_free[o.keyframe]; }))
+      continue;
+    SchurProblem::Point point{track.point, {}};
     for (const auto& o : track.observations)
-      seen_free = seen_free || (o.inlier && structure.placed[o.keyframe] && is_free[o.keyframe]);
-    if (!seen_free) continue;
-    for (const auto& o : track.observations) {
-      if (!o.inlier || !structure.placed[o.keyframe]) continue;
-      problem.AddResidualBlock(new ReprojectionCost(o.ray, focal_px), &loss,
-                               poses[o.keyframe].data(), track.point.data());
-      used[o.keyframe] = 1;
-    }
-    ordering->AddElementToGroup(track.point.data(), 0);
+      if (counts(o)) point.observations.push_back({o.keyframe, o.ray});
+    std::ranges::sort(point.observations, {}, &SchurProblem::Observation::camera);
+    for (const auto& o : point.observations) camera_of[o.camera] = 0;
+    report.residuals += static_cast<int>(point.observations.size());
+    problem.points.push_back(std::move(point));
+    adjusted.push_back(&track);
   }
-  for (std::size_t k = 0; k < n; ++k) {
-    if (!used[k]) continue;
-    problem.SetManifold(poses[k].data(), &manifold);
-    if (!is_free[k]) problem.SetParameterBlockConstant(poses[k].data());
-    ordering->AddElementToGroup(poses[k].data(), 1);
+  if (adjusted.empty()) return report;
+  for (std::size_t k = 0; k < n; ++k) {  // the key frames that see any of the points
+    if (camera_of[k] < 0) continue;
+    camera_of[k] = static_cast<int>(keyframe_of.size());
+    keyframe_of.push_back(static_cast<int>(k));
+    problem.cam_from_world.push_back(structure.cam_from_world[k]);
+    problem.is_free.push_back(static_cast<char>(is_free[k]));
   }
-  ceres::Solver::Options solver = solver_options(scope.max_iterations, scope.function_tolerance);
-  solver.linear_solver_type = ceres::SPARSE_SCHUR;
-  solver.linear_solver_ordering.reset(ordering);
-  if (problem.NumResidualBlocks() == 0) return {};
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver, &problem, &summary);
-  if (!summary.IsSolutionUsable()) return report_of(summary);
-  for (std::size_t k = 0; k < n; ++k)
-    if (used[k] && is_free[k]) structure.cam_from_world[k] = from_block(poses[k]);
-  return report_of(summary);
+  for (SchurProblem::Point& point : problem.points)
+    for (auto& o : point.observations) o.camera = camera_of[o.camera];
+
+  const SchurReport found = minimise(problem, {scope.max_iterations, scope.function_tolerance});
+  report.initial_cost = found.initial_cost;
+  report.final_cost = found.final_cost;
+  report.iterations = found.iterations;
+  report.converged = found.converged;
+  for (std::size_t c = 0; c < keyframe_of.size(); ++c)
+    structure.cam_from_world[keyframe_of[c]] = problem.cam_from_world[c];
+  for (std::size_t i = 0; i < adjusted.size(); ++i) adjusted[i]->point = problem.points[i].position;
+  return report;
 }
 
 BundleReport refine_pose(Rigid3& cam_from_world, const std::vector<Vec3>& points,

@@ -23,10 +23,9 @@ struct BundleScope {
   double function_tolerance = 1e-6;  // relative change of the cost at which to stop
 };
 
-/// Adjusts the placed key frames of the scope and every triangulated point they see with Ceres
-/// (Schur complement, Huber loss of `huber_px`); other placed key frames that see those points are
-/// held. `focal_px` turns rays into pixels. One thread, so that sums have one order and the result
-/// is the same on any number of cores.
+/// Adjusts the placed key frames of the scope and every triangulated point they see (schur.h, Huber
+/// loss of `huber_px`); other placed key frames that see those points are held. `focal_px` turns
+/// rays into pixels. The result is the same for any number of threads.
 BundleReport bundle_adjust(Structure& structure, double focal_px, const BundleOptions& options,
                            const BundleScope& scope);
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
 #include <utility>
 #include <vector>
 
@@ -77,22 +76,32 @@ cv::Mat even_light(const cv::Mat& gray, const cv::Mat& valid) {
   return result;
 }
 
-cv::Mat coarse_flow(const cv::Mat& reference, const cv::Mat& moving, const cv::Mat& valid) {
-  const double shrink = std::max(1.0, reference.cols / static_cast<double>(kCoarseWidthPx));
-  const cv::Size size(static_cast<int>(std::lround(reference.cols / shrink)),
-                      static_cast<int>(std::lround(reference.rows / shrink)));
-  const int columns = size.width / kCellPx - 1, rows = size.height / kCellPx - 1;
-  cv::Mat flow(reference.size(), CV_32FC2, cv::Scalar(0.0, 0.0));
-  if (columns < 2 || rows < 2) return flow;
-
-  cv::Mat a, b, wide, small_valid;
-  cv::resize(reference, a, size, 0, 0, cv::INTER_AREA);
-  cv::resize(moving, b, size, 0, 0, cv::INTER_AREA);
+FlowImage prepare_flow(const cv::Mat& gray, const cv::Mat& valid) {
+  check(gray.type() == CV_8U, "optical flow: expected an 8-bit gray image, found type {}",
+        gray.type());
+  check(valid.empty() || (valid.type() == CV_8U && valid.size() == gray.size()),
+        "optical flow: expected a mask of {} x {}, found {} x {}", gray.cols, gray.rows, valid.cols,
+        valid.rows);
+  const double shrink = std::max(1.0, gray.cols / static_cast<double>(kCoarseWidthPx));
+  const cv::Size size(static_cast<int>(std::lround(gray.cols / shrink)),
+                      static_cast<int>(std::lround(gray.rows / shrink)));
+  cv::Mat small, small_valid;
+  cv::resize(gray, small, size, 0, 0, cv::INTER_AREA);
   if (!valid.empty()) cv::resize(valid, small_valid, size, 0, 0, cv::INTER_AREA);
   if (!valid.empty()) small_valid = small_valid == 255;
-  cv::copyMakeBorder(even_light(b, small_valid), wide, kReachPx, kReachPx, kReachPx, kReachPx,
-                     cv::BORDER_CONSTANT, cv::Scalar(128));
-  a = even_light(a, small_valid);
+  return {even_light(small, small_valid), expand_polynomials(even_light(gray, valid))};
+}
+
+cv::Mat coarse_flow(const FlowImage& reference, const FlowImage& moving) {
+  const cv::Mat &a = reference.coarse, &b = moving.coarse;
+  const int columns = a.cols / kCellPx - 1, rows = a.rows / kCellPx - 1;
+  cv::Mat flow(reference.polynomials.at(0).mixed.size(), CV_32FC2, cv::Scalar(0.0, 0.0));
+  if (columns < 2 || rows < 2) return flow;
+  const double shrink = std::max(1.0, flow.cols / static_cast<double>(kCoarseWidthPx));
+
+  cv::Mat wide;
+  cv::copyMakeBorder(b, wide, kReachPx, kReachPx, kReachPx, kReachPx, cv::BORDER_CONSTANT,
+                     cv::Scalar(128));
   Scores scores;
   const int block = 2 * kCellPx;
   for (int y = 0; y < rows; ++y) {
@@ -132,24 +141,18 @@ cv::Mat coarse_flow(const cv::Mat& reference, const cv::Mat& moving, const cv::M
   return flow;
 }
 
+cv::Mat farneback_flow(const FlowImage& reference, const FlowImage& moving,
+                       const cv::Mat& initial) {
+  return farneback(reference.polynomials, moving.polynomials,
+                   initial.empty() ? coarse_flow(reference, moving) : initial);
+}
+
 cv::Mat farneback_flow(const cv::Mat& reference, const cv::Mat& moving, const cv::Mat& initial,
                        const cv::Mat& valid) {
-  check(reference.type() == CV_8U && moving.type() == CV_8U && reference.size() == moving.size(),
-        "optical flow: expected two 8-bit gray images of one size, found {} x {} and {} x {}",
-        reference.cols, reference.rows, moving.cols, moving.rows);
-  check(valid.empty() || (valid.type() == CV_8U && valid.size() == reference.size()),
-        "optical flow: expected a mask of {} x {}, found {} x {}", reference.cols, reference.rows,
-        valid.cols, valid.rows);
-  constexpr double kPyramidScale = 0.5;
-  constexpr int kLevels = 2;  // the start is within a few pixels: a taller pyramid adds nothing
-  constexpr int kWindowPx = 21, kIterations = 3;
-  constexpr int kPolynomialPx = 7;
-  constexpr double kPolynomialSigmaPx = 1.5;
-  cv::Mat flow = initial.empty() ? coarse_flow(reference, moving, valid) : initial.clone();
-  cv::calcOpticalFlowFarneback(even_light(reference, valid), even_light(moving, valid), flow,
-                               kPyramidScale, kLevels, kWindowPx, kIterations, kPolynomialPx,
-                               kPolynomialSigmaPx, cv::OPTFLOW_USE_INITIAL_FLOW);
-  return flow;
+  check(reference.size() == moving.size(),
+        "optical flow: expected two images of one size, found {} x {} and {} x {}", reference.cols,
+        reference.rows, moving.cols, moving.rows);
+  return farneback_flow(prepare_flow(reference, valid), prepare_flow(moving, valid), initial);
 }
 
 }  // namespace rugae

@@ -36,18 +36,19 @@ double mean_magnitude(const cv::Mat& flow, const cv::Mat& valid) {
 
 struct Candidate {
   int index = -1;
-  cv::Mat gray;  // shrunk
+  FlowImage image;  // shrunk
 };
 
-// Frames begin .. begin + kReadAhead - 1, shrunk, prepared in parallel.
-std::vector<Candidate> prepare(const FrameSource& frames, int begin, int shrink) {
+// Frames begin .. begin + kReadAhead - 1, shrunk, prepared in parallel; `valid` is as small.
+std::vector<Candidate> prepare(const FrameSource& frames, int begin, int shrink,
+                               const cv::Mat& valid) {
   const int count = std::max(0, std::min(kReadAhead, frames.size() - begin));
   std::vector<Candidate> block(static_cast<std::size_t>(count));
   tbb::parallel_for(0, count, [&](int i) {
     cv::Mat gray = frames.gray(begin + i);
     if (shrink > 1)
       cv::resize(gray, gray, {gray.cols / shrink, gray.rows / shrink}, 0, 0, cv::INTER_AREA);
-    block[static_cast<std::size_t>(i)] = {begin + i, gray};
+    block[static_cast<std::size_t>(i)] = {begin + i, prepare_flow(gray, valid)};
   });
   return block;
 }
@@ -74,9 +75,8 @@ class Selection {
       // Speculation: once a candidate becomes the reference, the values of those after it are void.
       std::vector<double> values(std::min(queue_.size(), kAtOnce));
       tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t i) {
-        values[i] =
-            px_per_flow_ *
-            mean_magnitude(farneback_flow(reference_.gray, queue_[i].gray, {}, valid_), valid_);
+        values[i] = px_per_flow_ *
+                    mean_magnitude(farneback_flow(reference_.image, queue_[i].image), valid_);
       });
       for (const double value : values) {
         if (decide(next(), value)) break;
@@ -139,14 +139,15 @@ Keyframes select_keyframes(const FrameSource& frames, const KeyframeOptions& opt
   cv::Mat valid = frames.valid();
   if (shrink > 1)
     cv::resize(valid, valid, {valid.cols / shrink, valid.rows / shrink}, 0, 0, cv::INTER_AREA);
+  valid = valid == 255;
   Selection selection(options.mean_flow_px * width / kReferenceWidthPx, options.max_gap, shrink,
-                      valid == 255);
+                      valid);
   progress.begin("key frames", static_cast<std::size_t>(frames.size()));
-  std::vector<Candidate> block = prepare(frames, 0, shrink);
+  std::vector<Candidate> block = prepare(frames, 0, shrink, valid);
   while (!block.empty()) {
     const int next = block.back().index + 1;
     std::future<std::vector<Candidate>> ahead =
-        std::async(std::launch::async, [&] { return prepare(frames, next, shrink); });
+        std::async(std::launch::async, [&] { return prepare(frames, next, shrink, valid); });
     for (const Candidate& frame : block) {
       selection.offer(frame);
       selection.run(false);

@@ -1,5 +1,7 @@
 #include "recon/mosaic.h"
 
+#include <tbb/parallel_for.h>
+
 #include "recon/blend.h"
 #include "recon/mosaic_plan.h"
 
@@ -9,16 +11,19 @@ std::vector<Mosaic> compose_mosaics(const FrameSource& frames, const Structure& 
                                     const std::vector<PairAlignment>& pairs,
                                     const MosaicOptions& options) {
   options.check();
-  std::vector<Mosaic> mosaics;
-  for (const MosaicPlan& plan : plan_mosaics(structure, pairs, frames.lens(), options)) {
+  const std::vector<MosaicPlan> plans = plan_mosaics(structure, pairs, frames.lens(), options);
+  std::vector<Mosaic> mosaics(plans.size());
+  // Side by side: most of what a picture takes runs on one thread.
+  tbb::parallel_for(std::size_t{0}, plans.size(), [&](std::size_t i) {
+    const MosaicPlan& plan = plans[i];
     std::vector<BlendInput> inputs;
     for (const MosaicMember& member : plan.members) {
-      const Frame frame = frames.frame(structure.frames[member.keyframe]);
+      const Frame frame = frames.map_frame(structure.frames[member.keyframe]);
       inputs.push_back({frame.map_bgr, frame.valid, member.anchor_from_member});
     }
     const BlendResult blended = blend(inputs, mosaic_bounds(frames.lens()), options.bands);
 
-    Mosaic mosaic;
+    Mosaic& mosaic = mosaics[i];
     mosaic.anchor = plan.anchor;
     for (const MosaicMember& member : plan.members) mosaic.members.push_back(member.keyframe);
     mosaic.bgr = blended.bgr;
@@ -30,8 +35,7 @@ std::vector<Mosaic> compose_mosaics(const FrameSource& frames, const Structure& 
         const int input = blended.seams.at<int>(y, x);
         mosaic.seams.at<int>(y, x) = input < 0 ? -1 : mosaic.members[input];
       }
-    mosaics.push_back(std::move(mosaic));
-  }
+  });
   return mosaics;
 }
 

@@ -8,6 +8,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/float4.h"
+
 namespace rugae {
 namespace {
 
@@ -25,14 +27,14 @@ struct Normalizer {
       : cx(0.5 * size.width), cy(0.5 * size.height), scale(2.0 / size.width) {}
 };
 
-// The reference with its gradient (central differences), interleaved: one bilinear look-up gives
-// all three.
+// The reference with its gradient (central differences), interleaved and filled up to four: one
+// bilinear look-up gives all three.
 cv::Mat with_gradients(const cv::Mat& image) {
   cv::Mat gx, gy, all;
   const cv::Mat kernel = (cv::Mat_<float>(1, 3) << -0.5F, 0.0F, 0.5F);
   cv::sepFilter2D(image, gx, CV_32F, kernel, cv::Mat::ones(1, 1, CV_32F));
   cv::sepFilter2D(image, gy, CV_32F, cv::Mat::ones(1, 1, CV_32F), kernel);
-  cv::merge(std::vector<cv::Mat>{image, gx, gy}, all);
+  cv::merge(std::vector<cv::Mat>{image, gx, gy, image}, all);
   return all;
 }
 
@@ -41,6 +43,58 @@ struct Sums {
   double b[6] = {};
   double a[21] = {};  // upper triangle by rows
 };
+
+// What the pixels of a row add up to, four at a time, with r the residual, (gx, gy) the gradient
+// and u the place along the row. v, the row's own place, is the same for all of them.
+struct RowSums {
+  Float4 rr = _mm_setzero_ps();
+  Float4 r_gx[2] = {rr, rr}, r_gy[2] = {rr, rr};                                     // times 1, u
+  Float4 gx_gx[3] = {rr, rr, rr}, gx_gy[3] = {rr, rr, rr}, gy_gy[3] = {rr, rr, rr};  // 1, u, u^2
+
+  void add(Float4 r, Float4 gx, Float4 gy, Float4 u) {
+    rr = rr + r * r;
+    const Float4 ugx = u * gx, ugy = u * gy;
+    r_gx[0] = r_gx[0] + r * gx;
+    r_gx[1] = r_gx[1] + r * ugx;
+    r_gy[0] = r_gy[0] + r * gy;
+    r_gy[1] = r_gy[1] + r * ugy;
+    gx_gx[0] = gx_gx[0] + gx * gx;
+    gx_gx[1] = gx_gx[1] + gx * ugx;
+    gx_gx[2] = gx_gx[2] + ugx * ugx;
+    gx_gy[0] = gx_gy[0] + gx * gy;
+    gx_gy[1] = gx_gy[1] + gx * ugy;
+    gx_gy[2] = gx_gy[2] + ugx * ugy;
+    gy_gy[0] = gy_gy[0] + gy * gy;
+    gy_gy[1] = gy_gy[1] + gy * ugy;
+    gy_gy[2] = gy_gy[2] + ugy * ugy;
+  }
+};
+
+double sum_of(Float4 v) {
+  float lane[4];
+  _mm_storeu_ps(lane, v);
+  return (static_cast<double>(lane[0]) + lane[1]) + (static_cast<double>(lane[2]) + lane[3]);
+}
+
+// With j = (gx u, gx v, gx, gy u, gy v, gy): b = sum j r, a = sum j j^T.
+Sums sums_of(const RowSums& row, double v, int overlap) {
+  Sums sums;
+  sums.squared_error = sum_of(row.rr);
+  sums.overlap = overlap;
+  const double power_of_v[2] = {1.0, v};
+  // Each parameter is a gradient times u, v or 1.
+  constexpr int kTimesU[3] = {1, 0, 0}, kTimesV[3] = {0, 1, 0};
+  const auto entry = [&](const Float4(&s)[3], int i, int l) {
+    return sum_of(s[kTimesU[i] + kTimesU[l]]) * power_of_v[kTimesV[i]] * power_of_v[kTimesV[l]];
+  };
+  for (int i = 0, k = 0; i < 6; ++i) {
+    const Float4(&r_g)[2] = i < 3 ? row.r_gx : row.r_gy;
+    sums.b[i] = sum_of(r_g[kTimesU[i % 3]]) * power_of_v[kTimesV[i % 3]];
+    for (int l = i; l < 6; ++l, ++k)
+      sums.a[k] = entry(l < 3 ? row.gx_gx : i < 3 ? row.gx_gy : row.gy_gy, i % 3, l % 3);
+  }
+  return sums;
+}
 
 // One row of moving pixels. d e / d(a1 a2 tx a3 a4 ty) = grad I_ref . d x' / d(...), with
 // x' in pixels = (A_n x_n) / scale + centre and x_n = ((x - cx) scale, (y - cy) scale, 1).
@@ -51,9 +105,13 @@ void add_row(const PatchPair& pair, const cv::Mat& reference, const Affine2& ref
   const auto* moving = pair.moving.ptr<float>(y);
   const auto* inside = pair.moving_patches.ptr<unsigned char>(y);
   const double py = y + 0.5;
-  float squared = 0.0F;
-  float b[6] = {}, a[21] = {};
-  int overlap = 0;
+  int overlap = 0, held = 0;
+  RowSums row;
+  float r[4] = {}, gx[4] = {}, gy[4] = {}, u[4] = {};  // the pixels waiting for their four
+  const auto flush = [&] {
+    row.add(_mm_loadu_ps(r), _mm_loadu_ps(gx), _mm_loadu_ps(gy), _mm_loadu_ps(u));
+    held = 0;
+  };
   const int last_x = reference.cols - 2, last_y = reference.rows - 2;
   const std::size_t stride = reference.step1();
   for (int x = 0; x < pair.moving.cols; ++x) {
@@ -64,31 +122,28 @@ void add_row(const PatchPair& pair, const cv::Mat& reference, const Affine2& ref
     if (!(qx >= 0.0 && qy >= 0.0 && qx < last_x + 1 && qy < last_y + 1)) continue;
     const int ix = static_cast<int>(qx), iy = static_cast<int>(qy);
     // w(x') is that of the pixel whose area holds x'.
-    if (!pair.reference_patches.at<unsigned char>(static_cast<int>(qy + 0.5),
-                                                  static_cast<int>(qx + 0.5)))
+    if (!pair.reference_patches.ptr<unsigned char>(
+            static_cast<int>(qy + 0.5))[static_cast<int>(qx + 0.5)])
       continue;
     const float fx = static_cast<float>(qx - ix), fy = static_cast<float>(qy - iy);
-    const float w00 = (1 - fx) * (1 - fy), w10 = fx * (1 - fy), w01 = (1 - fx) * fy, w11 = fx * fy;
-    const float* p0 = reference.ptr<float>(iy) + 3 * ix;
+    const Float4 w00 = splat((1 - fx) * (1 - fy)), w10 = splat(fx * (1 - fy)),
+                 w01 = splat((1 - fx) * fy), w11 = splat(fx * fy);
+    // Value and gradient at once.
+    const float* p0 = reference.ptr<float>(iy) + static_cast<std::ptrdiff_t>(4) * ix;
     const float* p1 = p0 + stride;
-    const float value = w00 * p0[0] + w10 * p0[3] + w01 * p1[0] + w11 * p1[3];
-    const float gx = (w00 * p0[1] + w10 * p0[4] + w01 * p1[1] + w11 * p1[4]) * inverse_scale;
-    const float gy = (w00 * p0[2] + w10 * p0[5] + w01 * p1[2] + w11 * p1[5]) * inverse_scale;
-    const float r = value - moving[x];
-    const float u = static_cast<float>((px - norm.cx) * norm.scale);
-    const float v = static_cast<float>((py - norm.cy) * norm.scale);
-    const float j[6] = {gx * u, gx * v, gx, gy * u, gy * v, gy};
-    squared += r * r;
+    float all[4];
+    _mm_storeu_ps(all, w00 * _mm_loadu_ps(p0) + w10 * _mm_loadu_ps(p0 + 4) +
+                           w01 * _mm_loadu_ps(p1) + w11 * _mm_loadu_ps(p1 + 4));
+    r[held] = all[0] - moving[x];
+    gx[held] = all[1] * inverse_scale;
+    gy[held] = all[2] * inverse_scale;
+    u[held] = static_cast<float>((px - norm.cx) * norm.scale);
     ++overlap;
-    for (int i = 0, k = 0; i < 6; ++i) {
-      b[i] += j[i] * r;
-      for (int l = i; l < 6; ++l, ++k) a[k] += j[i] * j[l];
-    }
+    if (++held == 4) flush();
   }
-  sums.squared_error = squared;
-  sums.overlap = overlap;
-  std::copy(b, b + 6, sums.b);
-  std::copy(a, a + 21, sums.a);
+  for (int i = held; i < 4; ++i) r[i] = gx[i] = gy[i] = 0.0F;
+  if (held > 0) flush();
+  sums = sums_of(row, (py - norm.cy) * norm.scale, overlap);
 }
 
 PatchCost cost_at(const PatchPair& pair, const cv::Mat& reference, const Affine2& ref_from_mov) {

@@ -4,6 +4,7 @@
 
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <vector>
 
 #include "core/types.h"
 
@@ -21,8 +22,32 @@ struct PointRefinementOptions {
 /// `linear` is the patch's linear map, mov from ref, kept. The squared difference is normalised:
 /// mean and gain of each patch are removed (the light moves with the camera), as in Lucas and
 /// Kanade with affine illumination (Baker and Matthews, IJCV 2004, doi:10.1023/B:VISI.0000011205.
-/// 11775.fd, inverse compositional). Images are CV_32F. Empty when the patch leaves an image, does
-/// not converge, matches badly, or its texture does not fix the place.
+/// 11775.fd, inverse compositional). Made once for many points: the disc is theirs in common.
+/// Calls are thread-safe.
+class PointRefiner {
+ public:
+  explicit PointRefiner(const PointRefinementOptions& options);
+
+  /// Images are CV_32F. Empty when the patch leaves an image, does not converge, matches badly, or
+  /// its texture does not fix the place.
+  std::optional<Vec2> operator()(const cv::Mat& reference, const cv::Mat& moving,
+                                 const Vec2& reference_px, const Vec2& moving_px,
+                                 const Mat2& linear) const;
+
+ private:
+  struct Template;
+  bool make_template(const cv::Mat& reference, const Vec2& center, Template& t) const;
+  bool sample(const cv::Mat& image, const Vec2& place, const Mat2& linear,
+              std::vector<float>& values) const;
+
+  PointRefinementOptions options_;
+  int radius_ = 0;              // whole px
+  std::size_t count_ = 0;       // pixels of the disc
+  std::vector<float> dx_, dy_;  // of each pixel from the centre; filled up with zeros to fours
+  std::vector<int> at_;         // its place in the square of side 2 radius + 3 around the disc
+};
+
+/// One point alone.
 std::optional<Vec2> refine_point(const cv::Mat& reference, const cv::Mat& moving,
                                  const Vec2& reference_px, const Vec2& moving_px,
                                  const Mat2& linear, const PointRefinementOptions& options);

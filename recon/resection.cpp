@@ -4,10 +4,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <memory>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
 #include "recon/bundle.h"
+#include "recon/cache.h"
 #include "recon/flow_guess.h"
 #include "recon/tracks.h"
 
@@ -21,6 +23,7 @@ constexpr double kMinInlierShare = 0.25;  // fewer: chance could have found them
 constexpr int kMinPoints = 6;
 constexpr std::size_t kMaxPoints = 400;  // followed into a frame: more adds time and no precision
 constexpr int kRefinements = 2;
+constexpr std::size_t kReferencesHeld = 8;
 constexpr int kFramesAtOnce = 16;  // between two steps of the progress line
 
 // Sights of known points from one frame.
@@ -29,43 +32,54 @@ struct Sighted {
   std::vector<Vec2> rays;
 };
 
-// Follows the triangulated points of one key frame into a frame that is thought to be near
-// `cam_from_world`.
-Sighted follow(const FrameSource& frames, const Structure& structure, int keyframe,
-               const Frame& moving, const std::optional<Rigid3>& cam_from_world,
-               const AlignOptions& align_options, std::uint64_t seed) {
-  std::vector<std::pair<const Track*, Vec2>> seen;
+// A known point as a key frame sees it.
+struct Seen {
+  Vec3 point;
+  Vec2 pixel;
+};
+
+// The triangulated points of each key frame, at most kMaxPoints of each.
+std::vector<std::vector<Seen>> points_seen(const Structure& structure) {
+  std::vector<std::vector<Seen>> seen(structure.frames.size());
   for (const Track& track : structure.tracks) {
     if (!track.triangulated) continue;
     for (const auto& o : track.observations)
-      if (o.keyframe == keyframe && o.inlier) seen.emplace_back(&track, o.pixel);
+      if (o.inlier) seen[o.keyframe].push_back({track.point, o.pixel});
   }
+  for (std::vector<Seen>& points : seen) {
+    const std::size_t stride = 1 + points.size() / kMaxPoints;
+    std::vector<Seen> chosen;
+    for (std::size_t i = 0; i < points.size(); i += stride) chosen.push_back(points[i]);
+    points = std::move(chosen);
+  }
+  return seen;
+}
+
+// Follows the points of one key frame, `reference`, into a frame that is thought to be near
+// `cam_from_world`.
+Sighted follow(const Lens& lens, const std::vector<Seen>& seen, const AlignImage& reference,
+               const AlignImage& moving, const std::optional<Rigid3>& cam_from_world,
+               const AlignOptions& align_options, std::uint64_t seed) {
   AlignGuess guess;
   guess.affine = false;
-  std::vector<const Track*> tracks;
   std::vector<Vec2> from, to;
-  const std::size_t stride = 1 + seen.size() / kMaxPoints;
-  for (std::size_t i = 0; i < seen.size(); i += stride) {
-    const auto& [track, pixel] = seen[i];
-    guess.reference_points.push_back(pixel);
-    tracks.push_back(track);
+  for (const Seen& s : seen) {
+    guess.reference_points.push_back(s.pixel);
     if (!cam_from_world) continue;
-    const auto there = frames.lens().project(*cam_from_world * track->point);
+    const auto there = lens.project(*cam_from_world * s.point);
     if (!there) continue;
-    from.push_back(pixel);
+    from.push_back(s.pixel);
     to.push_back(*there);
   }
   Sighted sighted;
-  if (static_cast<int>(tracks.size()) < kMinPoints) return sighted;
-  const Frame reference = frames.frame(structure.frames[keyframe]);
   guess.flow = guess_flow(from, to, 1.0, reference.gray.size());
   const auto pair = align(reference, moving, align_options,
                           pair_seed(seed, reference.index, moving.index), guess);
   if (!pair) return sighted;
   for (std::size_t i = 0; i < pair->point_index.size(); ++i) {
-    const auto ray = ray_of(frames.lens(), pair->moving_px[i]);
+    const auto ray = ray_of(lens, pair->moving_px[i]);
     if (!ray) continue;
-    sighted.points.push_back(tracks[pair->point_index[i]]->point);
+    sighted.points.push_back(seen[pair->point_index[i]].point);
     sighted.rays.push_back(*ray);
   }
   return sighted;
@@ -150,11 +164,23 @@ std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
     return poses;
   }
   const double focal_px = frames.lens().fx;
+  const std::vector<std::vector<Seen>> seen = points_seen(structure);
+  using Shared = std::shared_ptr<const AlignImage>;
+  Cache<Shared> references(kReferencesHeld);
+  const auto reference_at = [&](int frame) {
+    return std::make_shared<const AlignImage>(
+        prepare_alignment(frames.pose_frame(frame), align_options));
+  };
+  // No point starts in the frame to be placed: its reflections need not be known.
+  const cv::Mat none = cv::Mat::zeros(frames.valid().size(), CV_8U);
+  const auto moving_at = [&](int frame) {
+    return prepare_alignment({frame, frames.gray(frame), {}, none, frames.valid()}, align_options);
+  };
   for (std::size_t begin = 0; begin < rest.size(); begin += kFramesAtOnce) {
     const std::size_t end = std::min(rest.size(), begin + kFramesAtOnce);
     tbb::parallel_for(begin, end, [&](std::size_t i) {
       const int f = rest[i];
-      const Frame moving = frames.frame(f);
+      const AlignImage moving = moving_at(f);
       const auto after = static_cast<std::size_t>(
           std::lower_bound(placed_frames.begin(), placed_frames.end(), f) - placed_frames.begin());
       // Between two key frames the pose is thought to lie on the way from one to the other; the
@@ -171,8 +197,12 @@ std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
                        .inverse();
       }
       for (const std::size_t anchor : anchors) {
-        const Sighted sighted = follow(frames, structure, placed_keyframes[anchor], moving,
-                                       expected, align_options, seed);
+        const std::vector<Seen>& points = seen[placed_keyframes[anchor]];
+        if (static_cast<int>(points.size()) < kMinPoints) continue;
+        const int key = placed_frames[anchor];
+        const Shared reference = references.get(key, [&] { return reference_at(key); });
+        const Sighted sighted =
+            follow(frames.lens(), points, *reference, moving, expected, align_options, seed);
         const auto p = place_by_points(sighted.points, sighted.rays, focal_px, options);
         if (!p) continue;
         poses[f] = p->cam_from_world;

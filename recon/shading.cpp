@@ -134,21 +134,25 @@ cv::Mat tsai_shah(const cv::Mat& intensity, const cv::Mat& valid, const LightEst
 
   cv::Mat before = cv::Mat::zeros(intensity.size(), CV_32F), after = before.clone();
   cv::Mat variance(intensity.size(), CV_32F, cv::Scalar(options.s_0));
-  const auto inside = [&](int y, int x) { return valid.empty() || valid.at<uchar>(y, x) != 0; };
+  cv::Mat everywhere;
+  if (valid.empty()) everywhere = cv::Mat(intensity.size(), CV_8U, cv::Scalar(255));
+  const cv::Mat& known = valid.empty() ? everywhere : valid;
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
     tbb::parallel_for(0, intensity.rows, [&](int y) {
-      const float* row = before.ptr<float>(y);
-      const float* above = before.ptr<float>(std::max(y - 1, 0));
+      const int up = std::max(y - 1, 0);
+      const float *row = before.ptr<float>(y), *above = before.ptr<float>(up);
+      const uchar *inside = known.ptr<uchar>(y), *inside_above = known.ptr<uchar>(up);
+      const float* shown = intensity.ptr<float>(y);
       float* out = after.ptr<float>(y);
       float* s_row = variance.ptr<float>(y);
       for (int x = 0; x < intensity.cols; ++x) {
-        if (!inside(y, x)) continue;
+        if (inside[x] == 0) continue;
         const double z = row[x];
         // No slope across the border of what is known.
-        const double p = x > 0 && inside(y, x - 1) ? z - row[x - 1] : 0.0;
-        const double q = y > 0 && inside(y - 1, x) ? z - above[x] : 0.0;
+        const double p = x > 0 && inside[x - 1] != 0 ? z - row[x - 1] : 0.0;
+        const double q = y > 0 && inside_above[x] != 0 ? z - above[x] : 0.0;
         const Reflectance r = reflectance(p, q, to_light);
-        const double shade = std::min(intensity.at<float>(y, x) / light.albedo, 1.0);
+        const double shade = std::min(shown[x] / light.albedo, 1.0);
         const double f = shade - r.value;
         const double df = -r.by_depth;
         const double gain = s_row[x] * df / (options.w_n + s_row[x] * df * df);

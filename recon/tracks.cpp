@@ -1,7 +1,7 @@
 #include "recon/tracks.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <cmath>
@@ -48,6 +48,12 @@ class Occupied {
   static std::int64_t key(int x, int y) { return (static_cast<std::int64_t>(y) << 32) + x; }
   double spacing_;
   std::unordered_map<std::int64_t, std::vector<Vec2>> cells_;
+};
+
+// A frame with its corners, as far as both are known ahead of their turn.
+struct Prepared {
+  AlignImage image;
+  std::vector<Vec2> corners;
 };
 
 // Corners in order of strength, (0.5, 0.5) convention.
@@ -171,38 +177,49 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
   Followed followed;
   std::vector<int>& at = followed.keyframes;
   at = keyframes.frames;
-  std::map<int, Frame> prepared;  // from the reference on
-  const auto load = [&](int index) -> const Frame& {
+  std::map<int, Prepared> prepared;  // from the reference on
+  const auto prepare = [&](int index) -> Prepared {
+    const Frame frame = frames.pose_frame(index);
+    return {prepare_alignment(frame, align_options), corners(frame, spacing_px)};
+  };
+  const auto load = [&](int index) -> const Prepared& {
     const auto [place, fresh] = prepared.try_emplace(index);
-    if (fresh) place->second = frames.frame(index);
+    if (fresh) place->second = prepare(index);
     return place->second;
   };
   TrackChain chain;
   std::optional<PairAlignment> previous;  // k - 1 to k
+  // The flow between the next two key frames, measured while this one's neighbours are aligned.
+  struct {
+    int reference = -1, moving = -1;
+    PairFlow flow;
+  } ahead;
   int failed = 0;
   for (std::size_t k = 0; k < at.size(); ++k) {
-    const Frame& reference = load(at[k]);
+    const AlignImage& reference = load(at[k]).image;
     const cv::Size size = reference.gray.size();
-    const std::vector<Vec2> points =
-        chain.starts(at[k], corners(reference, spacing_px), spacing_px);
-    const auto follow = [&](const Frame& moving, const cv::Mat& guess, bool affine) {
+    const std::vector<Vec2> points = chain.starts(at[k], load(at[k]).corners, spacing_px);
+    const auto follow = [&](const AlignImage& moving, const cv::Mat& guess, bool affine) {
+      AlignGuess known{points, guess, affine, {}};
+      if (guess.empty() && ahead.reference == reference.index && ahead.moving == moving.index)
+        known.measured = ahead.flow;
       return align(reference, moving, align_options, pair_seed(seed, reference.index, moving.index),
-                   {points, guess, affine});
+                   known);
     };
     // To the next key frame: whatever the motion, or else as it was before.
-    const auto follow_next = [&](const Frame& next) {
+    const auto follow_next = [&](const AlignImage& next) {
       auto found = follow(next, {}, true);
       if (!found && previous) found = follow(next, continued(*previous, next.index, size), true);
       return found;
     };
     std::vector<std::optional<PairAlignment>> found;
     if (k + 1 < at.size()) {
-      found.push_back(follow_next(load(at[k + 1])));
+      found.push_back(follow_next(load(at[k + 1]).image));
       // Algorithm 2 goes by a flow that fast motion escapes: what it measures is then too little,
       // and the next key frame comes too late. The one half way becomes a key frame too.
       for (int next = at[k + 1]; !found[0] && next - at[k] > 1;) {
         next = at[k] + (next - at[k]) / 2;
-        found[0] = follow_next(load(next));
+        found[0] = follow_next(load(next).image);
         if (found[0]) at.insert(at.begin() + static_cast<std::ptrdiff_t>(k) + 1, next);
       }
     }
@@ -211,11 +228,29 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
         std::min(at.size() - 1 - k, static_cast<std::size_t>(align_options.neighbours));
     found.resize(count);
     for (std::size_t i = 1; i < count; ++i) load(at[k + 1 + i]);
-    tbb::parallel_for(std::size_t{1}, std::max(std::size_t{1}, count), [&](std::size_t i) {
-      const Frame& moving = prepared.at(at[k + 1 + i]);
-      if (found[0]) found[i] = follow(moving, continued_from(*found[0], moving.index, size), false);
-      if (!found[i]) found[i] = follow(moving, {}, false);
-    });
+    tbb::task_group tasks;
+    for (std::size_t i = 1; i < count; ++i) {
+      tasks.run([&, i] {
+        const AlignImage& moving = prepared.at(at[k + 1 + i]).image;
+        if (found[0])
+          found[i] = follow(moving, continued_from(*found[0], moving.index, size), false);
+        if (!found[i]) found[i] = follow(moving, {}, false);
+      });
+    }
+    // Meanwhile, what the next key frame will ask for first.
+    PairFlow next_flow;
+    if (k + 2 < at.size() && count > 1) {
+      tasks.run([&] {
+        next_flow = measure_flow(prepared.at(at[k + 1]).image, prepared.at(at[k + 2]).image);
+      });
+    }
+    const std::size_t newcomer = k + 1 + static_cast<std::size_t>(align_options.neighbours);
+    Prepared arriving;
+    const bool arrives = newcomer < at.size() && !prepared.contains(at[newcomer]);
+    if (arrives) tasks.run([&] { arriving = prepare(at[newcomer]); });
+    tasks.wait();
+    if (arrives) prepared[at[newcomer]] = std::move(arriving);
+    if (k + 2 < at.size() && count > 1) ahead = {at[k + 1], at[k + 2], std::move(next_flow)};
     previous.reset();
     for (std::size_t i = 0; i < count; ++i) {
       if (!found[i]) {

@@ -27,20 +27,33 @@ struct Corner {
   std::optional<Vec2> pixel;
 };
 
-/// Distance along `ray` to the triangle's plane where the ray meets its inside (Moeller and
-/// Trumbore, 1997, doi:10.1080/10867651.1997.10487468), either side; negative when it misses.
-double hit(const Vec3& ray, const Vec3& a, const Vec3& ab, const Vec3& ac) {
-  const Vec3 p = ray.cross(ac);
-  const double determinant = ab.dot(p);
-  if (determinant == 0.0) return -1.0;
-  // Neighbours share edges exactly; a rounding error must not open a slit between them.
-  constexpr double kEdge = 1e-9;
-  const double u = -a.dot(p) / determinant;
-  const Vec3 q = (-a).cross(ab);
-  const double v = ray.dot(q) / determinant;
-  if (!(u >= -kEdge && v >= -kEdge && u + v <= 1.0 + kEdge)) return -1.0;
-  return ac.dot(q) / determinant;
-}
+/// A triangle for rays from the origin (Moeller and Trumbore, 1997,
+/// doi:10.1080/10867651.1997.10487468). Their determinant and barycentric coordinates are triple
+/// products with the ray, whose other factors are the triangle's alone:
+///   det = ray . (ac x ab),   u = ray . (a x ac) / det,   v = ray . (ab x a) / det,
+///   distance = ac . (ab x a) / det.
+class Facet {
+ public:
+  Facet(const Vec3& a, const Vec3& ab, const Vec3& ac)
+      : determinant_(ac.cross(ab)), u_(a.cross(ac)), v_(ab.cross(a)), distance_(ac.dot(v_)) {}
+
+  /// Distance along `ray` to the triangle's plane where the ray meets its inside, either side;
+  /// negative when it misses.
+  double hit(const Vec3& ray) const {
+    const double determinant = ray.dot(determinant_);
+    if (determinant == 0.0) return -1.0;
+    // Neighbours share edges exactly; a rounding error must not open a slit between them.
+    constexpr double kEdge = 1e-9;
+    const double inverse = 1.0 / determinant;
+    const double u = ray.dot(u_) * inverse, v = ray.dot(v_) * inverse;
+    if (!(u >= -kEdge && v >= -kEdge && u + v <= 1.0 + kEdge)) return -1.0;
+    return distance_ * inverse;
+  }
+
+ private:
+  Vec3 determinant_, u_, v_;
+  double distance_;
+};
 
 /// The directions in which a triangle may be seen: those within an angle of the centre of the
 /// sphere around it; all of them when the eye is inside that sphere.
@@ -101,6 +114,7 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world, co
   for (const Vec3i& triangle : map.triangles) {
     const std::array<const Corner*, 3> c = {&corners[triangle[0]], &corners[triangle[1]],
                                             &corners[triangle[2]]};
+    if (std::max({c[0]->p_cam.z(), c[1]->p_cam.z(), c[2]->p_cam.z()}) <= 0.0) continue;  // behind
     Eigen::AlignedBox2d box;
     int projected = 0;
     for (const Corner* corner : c)
@@ -118,18 +132,18 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world, co
     // Part of a triangle that is not projected whole may cover anything within its cone.
     if (projected < 3) box = {Vec2(0, 0), Vec2(lens.width, lens.height)};
     const double margin = 1.0 + kCurvedEdgeMargin * curved * size_px;
-    const double seen_cosine = std::cos(seen.half_angle_rad) - kCosineRounding;
     const int left = std::max(0, static_cast<int>(std::floor(box.min().x() - margin)));
     const int top = std::max(0, static_cast<int>(std::floor(box.min().y() - margin)));
     const int right = std::min(lens.width - 1.0, std::ceil(box.max().x() + margin));
     const int bottom = std::min(lens.height - 1.0, std::ceil(box.max().y() + margin));
     if (left > right || top > bottom) continue;
-    const Vec3 ab = c[1]->p_cam - c[0]->p_cam, ac = c[2]->p_cam - c[0]->p_cam;
+    const double seen_cosine = std::cos(seen.half_angle_rad) - kCosineRounding;
+    const Facet facet(c[0]->p_cam, c[1]->p_cam - c[0]->p_cam, c[2]->p_cam - c[0]->p_cam);
     for (int y = top; y <= bottom; ++y)
       for (int x = left; x <= right; ++x) {
         const Vec3& ray = rays[static_cast<std::size_t>(y) * lens.width + x];
         if (!(ray.z() > 0.0) || ray.dot(seen.centre) < seen_cosine) continue;
-        const double z = hit(ray, c[0]->p_cam, ab, ac) * ray.z();
+        const double z = facet.hit(ray) * ray.z();
         float& nearest = depth.at<float>(y, x);
         if (z > 0.0 && !(nearest <= z)) nearest = static_cast<float>(z);
       }

@@ -14,7 +14,7 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 // Raised when the same settings give other results, so that older ones are not taken for new.
-constexpr int kResultsVersion = 2;
+constexpr int kResultsVersion = 3;
 constexpr std::size_t kHashLetters = 10;
 
 // A preset may build on another of its kind, so all of them count, and a file on other files.

@@ -1,6 +1,9 @@
 #include "validate/evaluate.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -14,6 +17,8 @@ namespace {
 
 using nlohmann::json;
 namespace fs = std::filesystem;
+
+constexpr int kFramesAtOnce = 16;  // whose depth is read side by side
 
 // The tracked poses at the times of the truth: frames are the same by index, and must be so by
 // time.
@@ -97,25 +102,44 @@ json frames_json(const Truth& truth, const Estimate& estimate, const PoseErrors&
 
 json depth_errors(const Truth& truth, const EstimateLayout& layout, const PoseErrors& poses,
                   Progress& progress) {
+  struct OfFrame {
+    std::optional<DepthError> metric, by_median;
+  };
   std::vector<DepthError> metric, by_median;
-  for (int i = 0; i < truth.size(); ++i) {
-    progress.step();
-    if (!fs::exists(layout.depth(i))) continue;
-    const cv::Mat estimated = read_exr(layout.depth(i)), true_mm = truth.depth_mm(i);
-    if (poses.sim3)
-      if (const auto error = depth_error(estimated, true_mm, poses.sim3->truth_from_estimate.scale))
-        metric.push_back(*error);
-    if (const auto scale = median_scale(estimated, true_mm))
-      if (const auto error = depth_error(estimated, true_mm, *scale)) by_median.push_back(*error);
+  for (int begin = 0; begin < truth.size(); begin += kFramesAtOnce) {
+    const int count = std::min(kFramesAtOnce, truth.size() - begin);
+    std::vector<OfFrame> block(static_cast<std::size_t>(count));
+    tbb::parallel_for(0, count, [&](int i) {
+      const int frame = begin + i;
+      if (!fs::exists(layout.depth(frame))) return;
+      const cv::Mat estimated = read_exr(layout.depth(frame)), true_mm = truth.depth_mm(frame);
+      OfFrame& errors = block[static_cast<std::size_t>(i)];
+      if (poses.sim3)
+        errors.metric = depth_error(estimated, true_mm, poses.sim3->truth_from_estimate.scale);
+      if (const auto scale = median_scale(estimated, true_mm))
+        errors.by_median = depth_error(estimated, true_mm, *scale);
+    });
+    for (const OfFrame& errors : block) {  // means add up in the order of frames
+      if (errors.metric) metric.push_back(*errors.metric);
+      if (errors.by_median) by_median.push_back(*errors.by_median);
+    }
+    progress.step(static_cast<std::size_t>(count));
   }
   return {{"sim3", depth_json(mean_of(metric))}, {"median_scaled", depth_json(mean_of(by_median))}};
 }
 
 Visibility visibility_of(const Truth& truth, Progress& progress) {
   Visibility visibility(truth.wall(), {});
-  for (int i = 0; i < truth.size(); ++i) {
-    visibility.add(truth.camera().lens, truth.track()[i].world_from_camera, truth.depth_mm(i));
-    progress.step();
+  for (int begin = 0; begin < truth.size(); begin += kFramesAtOnce) {
+    const int count = std::min(kFramesAtOnce, truth.size() - begin);
+    std::vector<cv::Mat> depths_mm(static_cast<std::size_t>(count));
+    tbb::parallel_for(0, count, [&](int i) {
+      depths_mm[static_cast<std::size_t>(i)] = truth.depth_mm(begin + i);
+    });
+    for (int i = 0; i < count; ++i)
+      visibility.add(truth.camera().lens, truth.track()[begin + i].world_from_camera,
+                     depths_mm[static_cast<std::size_t>(i)]);
+    progress.step(static_cast<std::size_t>(count));
   }
   return visibility;
 }
@@ -149,13 +173,23 @@ json surface_errors(const Estimate& estimate, const TriangleMesh& seen, const Po
   constexpr std::size_t kMapPoints = 5'000, kWallPoints = 50'000;  // for ICP alone
   const std::vector<Vec3> of_map = sample_surface(placed, kMapPoints);
   const std::vector<Vec3> of_wall = sample_surface(seen, kWallPoints);
-  for (const bool with_scale : {false, true}) {
-    const IcpResult found = icp(of_map, of_wall, {.with_scale = with_scale});
-    if (!found.converged) continue;
-    const auto error = truth.error_of(transformed(placed, found.target_from_source));
-    out[with_scale ? "icp_scaled" : "icp_aligned"] = surface_json(error);
-    if (!with_scale) out["icp"] = transform_json(found.target_from_source);
+  // Each ICP keeps to one thread (icp.cpp): the two run side by side.
+  struct Aligned {
+    IcpResult found;
+    json error;
+  };
+  std::array<Aligned, 2> aligned;
+  tbb::parallel_for(std::size_t{0}, aligned.size(), [&](std::size_t i) {
+    aligned[i].found = icp(of_map, of_wall, {.with_scale = i == 1});
+    if (!aligned[i].found.converged) return;
+    const Sim3& target_from_source = aligned[i].found.target_from_source;
+    aligned[i].error = surface_json(truth.error_of(transformed(placed, target_from_source)));
+  });
+  if (aligned[0].found.converged) {
+    out["icp_aligned"] = aligned[0].error;
+    out["icp"] = transform_json(aligned[0].found.target_from_source);
   }
+  if (aligned[1].found.converged) out["icp_scaled"] = aligned[1].error;
   return out;
 }
 

@@ -1,12 +1,11 @@
 #include "recon/preprocess/preprocess.h"
 
 #include <algorithm>
-#include <list>
-#include <mutex>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/check.h"
+#include "recon/cache.h"
 #include "recon/preprocess/devignette.h"
 #include "recon/preprocess/reflections.h"
 #include "recon/preprocess/undistort.h"
@@ -19,35 +18,6 @@ constexpr int kProfileSamples = 257;   // of the published profile
 constexpr std::size_t kCachedFrames = 6;
 constexpr std::size_t kCachedGrays = 24;
 
-// The values computed last, newest first.
-template <typename T>
-class Cache {
- public:
-  explicit Cache(std::size_t capacity) : capacity_(capacity) {}
-
-  template <typename Make>
-  T get(int index, Make make) {
-    {
-      const std::lock_guard lock(mutex_);
-      for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
-        if (entry->first != index) continue;
-        entries_.splice(entries_.begin(), entries_, entry);
-        return entries_.front().second;
-      }
-    }
-    T value = make();  // outside the lock: two threads may make the same value, never wait
-    const std::lock_guard lock(mutex_);
-    entries_.emplace_front(index, value);
-    if (entries_.size() > capacity_) entries_.pop_back();
-    return value;
-  }
-
- private:
-  std::size_t capacity_;
-  std::mutex mutex_;
-  std::list<std::pair<int, T>> entries_;
-};
-
 }  // namespace
 
 struct FrameSource::Impl {
@@ -59,7 +29,7 @@ struct FrameSource::Impl {
   cv::Mat valid;
   cv::Mat gain;  // 1 / V; empty when switched off
   std::vector<double> profile;
-  Cache<Frame> frames{kCachedFrames};
+  Cache<Frame> frames{kCachedFrames}, pose_frames{kCachedFrames}, map_frames{kCachedFrames};
   Cache<cv::Mat> grays{kCachedGrays};
 
   Impl(const Observations& source, const PreprocessOptions& chosen)
@@ -119,16 +89,21 @@ struct FrameSource::Impl {
     return correct(move(gray));
   }
 
-  Frame make_frame(int index) const {
+  Frame make_frame(int index, bool for_pose, bool for_map) const {
     const cv::Mat bgr = observations.image(index);
     const cv::Mat gray = gray_of(bgr);
     const cv::Mat reflection = detect_reflections(gray, options.reflections, field);
     const ReflectionOptions& chosen = options.reflections;
-    const cv::Mat pose =
-        chosen.suppress_for_pose ? suppress_reflections(gray, reflection, chosen) : gray;
-    const cv::Mat map =
-        chosen.suppress_for_map ? suppress_reflections(bgr, reflection, chosen) : bgr;
-    return {index, correct(move(pose)), correct(move(map)), move_mask(reflection), valid};
+    Frame frame{index, {}, {}, {}, valid};
+    if (for_pose) {
+      frame.gray = correct(
+          move(chosen.suppress_for_pose ? suppress_reflections(gray, reflection, chosen) : gray));
+      frame.reflection = move_mask(reflection);
+    }
+    if (for_map)
+      frame.map_bgr = correct(
+          move(chosen.suppress_for_map ? suppress_reflections(bgr, reflection, chosen) : bgr));
+    return frame;
   }
 };
 
@@ -154,7 +129,17 @@ const std::vector<double>& FrameSource::vignetting_profile() const { return impl
 
 Frame FrameSource::frame(int index) const {
   check(index >= 0 && index < size(), "frame {} of {}: no such frame", index, size());
-  return impl_->frames.get(index, [&] { return impl_->make_frame(index); });
+  return impl_->frames.get(index, [&] { return impl_->make_frame(index, true, true); });
+}
+
+Frame FrameSource::pose_frame(int index) const {
+  check(index >= 0 && index < size(), "frame {} of {}: no such frame", index, size());
+  return impl_->pose_frames.get(index, [&] { return impl_->make_frame(index, true, false); });
+}
+
+Frame FrameSource::map_frame(int index) const {
+  check(index >= 0 && index < size(), "frame {} of {}: no such frame", index, size());
+  return impl_->map_frames.get(index, [&] { return impl_->make_frame(index, false, true); });
 }
 
 cv::Mat FrameSource::gray(int index) const {

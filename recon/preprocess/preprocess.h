@@ -43,7 +43,12 @@ class FrameSource {
   /// Frame::valid, the same for all frames.
   const cv::Mat& valid() const;
   Frame frame(int index) const;
-  /// Only `gray`: what key frame selection and resection need.
+  /// Without `map_bgr` (it is empty): what alignment needs. Painting the reflections over for the
+  /// map takes longer than everything else here.
+  Frame pose_frame(int index) const;
+  /// Only `map_bgr` and `valid`: what mosaics are made of.
+  Frame map_frame(int index) const;
+  /// Only `gray`: what key frame selection needs.
   cv::Mat gray(int index) const;
   /// B(r): the estimated vignetting profile, V at r = 0 .. 1 in equal steps (1 = half the
   /// diagonal); empty when switched off.

@@ -21,9 +21,10 @@ bool within_stop(const Lens& lens, const Vec2& pixel) {
 }  // namespace
 
 Undistortion::Undistortion(const Lens& from, const Lens& to)
-    : source_px_(to.height, to.width, CV_32FC2), valid_(to.height, to.width, CV_8U, cv::Scalar(0)) {
+    : valid_(to.height, to.width, CV_8U, cv::Scalar(0)) {
+  cv::Mat source_px(to.height, to.width, CV_32FC2);
   for (int y = 0; y < to.height; ++y) {
-    auto* row = source_px_.ptr<cv::Vec2f>(y);
+    auto* row = source_px.ptr<cv::Vec2f>(y);
     for (int x = 0; x < to.width; ++x) {
       row[x] = {kNowherePx, kNowherePx};
       const std::optional<Vec3> ray = to.unproject({x + 0.5, y + 0.5});
@@ -37,18 +38,20 @@ Undistortion::Undistortion(const Lens& from, const Lens& to)
       if (inside && within_stop(from, *pixel)) valid_.at<unsigned char>(y, x) = 255;
     }
   }
+  cv::convertMaps(source_px, {}, source_px_, source_step_, CV_16SC2);
 }
 
 cv::Mat Undistortion::image(const cv::Mat& image) const {
   cv::Mat moved;
-  cv::remap(image, moved, source_px_, {}, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  cv::remap(image, moved, source_px_, source_step_, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
   moved.setTo(0, valid_ == 0);
   return moved;
 }
 
 cv::Mat Undistortion::mask(const cv::Mat& mask) const {
   cv::Mat moved;
-  cv::remap(mask, moved, source_px_, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
+  cv::remap(mask, moved, source_px_, source_step_, cv::INTER_LINEAR, cv::BORDER_CONSTANT,
+            cv::Scalar(0));
   return moved >= 128;
 }
 

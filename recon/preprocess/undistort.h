@@ -21,7 +21,9 @@ class Undistortion {
   const cv::Mat& valid() const { return valid_; }
 
  private:
-  cv::Mat source_px_;  // CV_32FC2, OpenCV's integer-centre convention
+  // OpenCV's integer-centre convention, as its remap wants it: whole px (CV_16SC2) and 1/32 px
+  // steps (CV_16U), which it would otherwise find anew for each image.
+  cv::Mat source_px_, source_step_;
   cv::Mat valid_;
 };
 

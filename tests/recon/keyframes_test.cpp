@@ -86,6 +86,15 @@ TEST_F(Sequence, VignettingIsEstimatedOnce) {
   EXPECT_EQ(cv::norm(frames.gray(2), frames.frame(2).gray, cv::NORM_INF), 0.0);
 }
 
+TEST_F(Sequence, PartsOfAFrameAreThoseOfTheWhole) {
+  const FrameSource frames = source({4, 4}, PreprocessOptions());
+  const Frame whole = frames.frame(1), pose = frames.pose_frame(1), map = frames.map_frame(1);
+  EXPECT_EQ(cv::norm(pose.gray, whole.gray, cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(pose.reflection, whole.reflection, cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(map.map_bgr, whole.map_bgr, cv::NORM_INF), 0.0);
+  EXPECT_TRUE(pose.map_bgr.empty() && map.gray.empty());
+}
+
 TEST(Flow, FollowsTheWallNotTheLight) {
   // The wall moves by 24 px under a spot of light that stands still.
   const Texture texture(2, 7.0, 60.0);
