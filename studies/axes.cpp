@@ -10,9 +10,9 @@ namespace rugae {
 namespace {
 
 // What a cell is made with, and can so be changed from cell to cell.
-const std::vector<std::string> kSections = {"render",     "recon",      "scene",
-                                            "resolution", "frames",     "first",
-                                            "calibrate",  "lens_error", "replace"};
+const std::vector<std::string> kSections = {"render",     "recon",  "scene", "camera",
+                                            "resolution", "frames", "first", "calibrate",
+                                            "lens_error", "replace"};
 
 std::string first_key(const std::string& path) { return path.substr(0, path.find('.')); }
 

@@ -32,13 +32,13 @@ std::string preset_hash(const std::string& kind, const std::string& what,
 }
 
 // Everything the dataset is a function of.
-json dataset_key(const Variant& variant, const Cell& cell) {
+json dataset_key(const Variant& variant, const Cell& cell, const std::string& camera) {
   const SimulateOptions& s = variant.simulate;
   const std::string scene =
       sha256_of_bytes(preset_hash("scenes", "scene", s.scene) + variant.scene_text);
   return {{"version", kResultsVersion},
           {"scene", scene},
-          {"camera", preset_hash("cameras", "camera", cell.camera)},
+          {"camera", preset_hash("cameras", "camera", camera)},
           {"trajectory", preset_hash("trajectories", "trajectory", cell.trajectory)},
           {"resolution", s.resolution},
           {"frames", s.frames},
@@ -49,6 +49,18 @@ json dataset_key(const Variant& variant, const Cell& cell) {
 
 std::string short_hash(const json& key) {
   return sha256_of_bytes(key.dump()).substr(0, kHashLetters);
+}
+
+std::string camera_of(const Variant& variant, const Cell& cell, const fs::path& out) {
+  if (variant.camera_changes.empty()) return cell.camera;
+  const std::string text = camera_text(cell.camera, variant.camera_changes);
+  const fs::path file =
+      out / "cameras" / fmt::format("{}_{}.yaml", stem(cell.camera), short_hash(text));
+  if (!fs::exists(file)) {
+    make_folder(file.parent_path());
+    write_atomic(file, text);
+  }
+  return file.string();
 }
 
 // What a program's estimate is a function of: its arguments, and its text where it is a file.
@@ -77,9 +89,9 @@ bool CellFiles::finished() const {
   return fs::exists(metrics) && dataset_finished(dataset) && !tried_again(metrics);
 }
 
-CalibrationRun calibration_of(const Variant& variant, const Cell& cell) {
+CalibrationRun calibration_of(const Variant& variant, const Cell& cell, const CellFiles& files) {
   CalibrationRun run;
-  run.camera = cell.camera;
+  run.camera = files.camera;
   run.seed = cell.seed;
   run.render = variant.simulate.render;
   return run;
@@ -87,9 +99,10 @@ CalibrationRun calibration_of(const Variant& variant, const Cell& cell) {
 
 CellFiles files_of(const StudyOptions& study, const Cell& cell, const fs::path& out) {
   const Variant& variant = study.variants[static_cast<std::size_t>(cell.variant)];
-  const json data_key = dataset_key(variant, cell);
-  const std::string where = fmt::format("{}_{}", stem(cell.camera), stem(cell.trajectory));
   CellFiles files;
+  files.camera = camera_of(variant, cell, out);
+  const json data_key = dataset_key(variant, cell, files.camera);
+  const std::string where = fmt::format("{}_{}", stem(cell.camera), stem(cell.trajectory));
   const auto dataset = [&](const json& key) {
     return out / "datasets" / fmt::format("{}_{}", where, short_hash(key));
   };
@@ -98,17 +111,17 @@ CellFiles files_of(const StudyOptions& study, const Cell& cell, const fs::path& 
     files.scene = out / "scenes" / (short_hash(variant.scene_text) + ".yaml");
   json key = {{"dataset", data_key}};
   if (variant.replace == Replace::frames) {
-    const json clean_key = dataset_key(with_clean_frames(variant), cell);
+    const json clean_key = dataset_key(with_clean_frames(variant), cell, files.camera);
     files.frames = dataset(clean_key);
     key["frames"] = clean_key;
   }
   if (variant.calibrate) {
-    files.calibration = calibration_folder(calibration_of(variant, cell), out);
+    files.calibration = calibration_folder(calibration_of(variant, cell, files), out);
     key["calibration"] = files.calibration.filename().string();
   }
   if (variant.lens_error != 0.0) {
     key["lens_error"] = variant.lens_error;
-    const json lens_key = {{"camera", preset_hash("cameras", "camera", cell.camera)},
+    const json lens_key = {{"camera", preset_hash("cameras", "camera", files.camera)},
                            {"calibration", files.calibration.filename().string()},
                            {"error", variant.lens_error}};
     files.lens =

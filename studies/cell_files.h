@@ -13,6 +13,7 @@
 namespace rugae {
 
 struct CellFiles {
+  std::string camera;             // the cell's, or OUT/cameras/<camera>_<hash>.yaml: it changed
   std::filesystem::path dataset;  // OUT/datasets/<camera>_<trajectory>_<hash>/
   std::filesystem::path frames;   // the dataset whose frames are reconstructed: the same, but where
                                   // others take their place
@@ -31,10 +32,11 @@ struct CellFiles {
 std::filesystem::path simulation_of(const std::filesystem::path& dataset);
 bool dataset_finished(const std::filesystem::path& dataset);
 
+/// A changed camera's file is written, since others are named by what it makes.
 CellFiles files_of(const StudyOptions& study, const Cell& cell, const std::filesystem::path& out);
 
 /// The boards that the cell's lens is calibrated from.
-CalibrationRun calibration_of(const Variant& variant, const Cell& cell);
+CalibrationRun calibration_of(const Variant& variant, const Cell& cell, const CellFiles& files);
 
 /// Throws Error naming the file when it is not JSON.
 nlohmann::json read_json(const std::filesystem::path& file);

@@ -32,17 +32,17 @@ json simulation_json(const SimulateResult& r) {
           {"write_thread_s", r.write_s}};
 }
 
-void make_dataset(const Variant& variant, const Cell& cell, const fs::path& scene,
+void make_dataset(const Variant& variant, const Cell& cell, const CellFiles& files,
                   const fs::path& dataset, Progress& progress) {
   if (dataset_finished(dataset)) return;
   SimulateOptions options = variant.simulate;
-  options.camera = cell.camera;
+  options.camera = files.camera;
   options.trajectory = cell.trajectory;
   options.seed = cell.seed;
-  if (!scene.empty()) {
-    make_folder(scene.parent_path());
-    write_atomic(scene, variant.scene_text);
-    options.scene = scene.string();
+  if (!files.scene.empty()) {
+    make_folder(files.scene.parent_path());
+    write_atomic(files.scene, variant.scene_text);
+    options.scene = files.scene.string();
   }
   make_folder(dataset.parent_path());
   const json measured = simulation_json(simulate(options, dataset, progress));
@@ -70,7 +70,8 @@ ToldLens make_lens(const Variant& variant, const Cell& cell, const CellFiles& fi
   ToldLens told;
   if (!files.calibration.empty()) {
     const fs::path out = files.calibration.parent_path().parent_path();
-    const CalibratedLens made = calibrated_lens(calibration_of(variant, cell), out, progress);
+    const CalibratedLens made =
+        calibrated_lens(calibration_of(variant, cell, files), out, progress);
     told = {made.file, made.metrics};
   }
   if (files.lens.empty()) return told;
@@ -139,9 +140,9 @@ void write_metrics(const CellFiles& files, json metrics) {
 void make_cell(const StudyOptions& study, const Cell& cell, const CellFiles& files,
                Progress& progress) {
   const Variant& variant = study.variants[static_cast<std::size_t>(cell.variant)];
-  make_dataset(variant, cell, files.scene, files.dataset, progress);
+  make_dataset(variant, cell, files, files.dataset, progress);
   if (files.frames != files.dataset)
-    make_dataset(with_clean_frames(variant), cell, files.scene, files.frames, progress);
+    make_dataset(with_clean_frames(variant), cell, files, files.frames, progress);
   if (study.measure != Measure::loop) {
     write_metrics(files, measured(study, variant, cell, files, progress));
     return;

@@ -186,7 +186,7 @@ StudyOptions read_part_text(const std::string& text, const std::string& name) {
   for (YamlReader& gate : yaml.children("gates")) study.gates.push_back(read_gate(gate, axes));
   study.summaries = read_summaries(yaml, axes);
   yaml.finish();
-  study.variants = read_variants(text, name, axes);
+  study.variants = read_variants(text, name, axes, study.cameras);
   return study;
 }
 

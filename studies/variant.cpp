@@ -4,14 +4,18 @@
 
 #include <filesystem>
 
+#include "cameras/camera.h"
 #include "core/check.h"
 #include "core/files.h"
+#include "core/presets.h"
 #include "scenes/scene_file.h"
 
 namespace rugae {
 namespace {
 
 namespace fs = std::filesystem;
+
+const std::string kCamera = "camera.";  // what paths into a camera's file begin with
 
 // Errors in a text that is not the user's file are told without the place in it.
 std::string without_place(const std::string& what, const std::string& name) {
@@ -22,19 +26,41 @@ bool is_path(const std::string& name_or_path) {
   return fs::path(name_or_path).has_extension() || name_or_path.find('/') != std::string::npos;
 }
 
-// A scene is read from a file, so it becomes one for the time of reading.
-void check_scene(const std::string& text, const std::string& where) {
+// What is read from a file becomes one for the time of reading. Throws Error without the place in
+// it.
+template <typename Read>
+void check_text(const std::string& text, const Read& read) {
   const fs::path file =
-      fs::temp_directory_path() / fmt::format("rugae_scene_{}_{}.yaml", getpid(), text.size());
+      fs::temp_directory_path() / fmt::format("rugae_text_{}_{}.yaml", getpid(), text.size());
   write_atomic(file, text);
   std::string problem;
   try {
-    read_scene_file(file, 1);
+    read(file);
   } catch (const Error& error) {
     problem = without_place(error.what(), file.string());
   }
   fs::remove(file);
-  check(problem.empty(), "{}: {}", where, problem);
+  check(problem.empty(), "{}", problem);
+}
+
+void check_scene(const std::string& text, const std::string& where) {
+  try {
+    check_text(text, [](const fs::path& file) { read_scene_file(file, 1); });
+  } catch (const Error& error) {
+    fail("{}: {}", where, error.what());
+  }
+}
+
+void check_cameras(const std::vector<std::string>& cameras, const std::vector<Change>& changes) {
+  if (changes.empty()) return;
+  for (const std::string& camera : cameras) {
+    try {
+      check_text(camera_text(camera, changes),
+                 [](const fs::path& file) { load_camera(file.string()); });
+    } catch (const Error& error) {
+      fail("camera '{}': {}", camera, error.what());
+    }
+  }
 }
 
 void read_scene(YamlReader& yaml, const std::string& study_file, Variant& variant) {
@@ -64,16 +90,25 @@ std::string changed_text(const std::string& text, const Change& change) {
 }
 
 Variant variant_with(const std::string& text, const std::string& study_file,
+                     const std::vector<std::string>& cameras,
                      const std::vector<Setting>& settings) {
   // A name that no file has, in the folder of the one that is changed: paths go from there.
   const std::string name = (fs::path(study_file).parent_path() / "<changed>").string();
   try {
     std::string changed = text;
+    std::vector<Change> of_camera;
     for (const Setting& s : settings)
-      for (const Change& change : s.changes) changed = changed_text(changed, change);
+      for (const Change& change : s.changes) {
+        if (change.path.starts_with(kCamera))
+          of_camera.push_back({change.path.substr(kCamera.size()), change.value});
+        else
+          changed = changed_text(changed, change);
+      }
     YamlReader yaml = YamlReader::from_text(changed, name);
     Variant variant = read_variant(yaml, name);
     variant.settings = settings;
+    check_cameras(cameras, of_camera);
+    variant.camera_changes = std::move(of_camera);
     return variant;
   } catch (const Error& error) {
     fail("{}", without_place(error.what(), name));
@@ -81,14 +116,15 @@ Variant variant_with(const std::string& text, const std::string& study_file,
 }
 
 Variant variant_of_axes(const std::string& text, const std::string& study_file,
-                        const std::vector<Axis>& axes, const std::vector<Setting>& settings) {
+                        const std::vector<std::string>& cameras, const std::vector<Axis>& axes,
+                        const std::vector<Setting>& settings) {
   try {
-    return variant_with(text, study_file, settings);
+    return variant_with(text, study_file, cameras, settings);
   } catch (const Error& error) {
     // The axis that is wrong alone, or all of them together.
     for (std::size_t i = 0; i < axes.size(); ++i) {
       try {
-        variant_with(text, study_file, {settings[i]});
+        variant_with(text, study_file, cameras, {settings[i]});
       } catch (const Error& alone) {
         fail("{}: axis {}: {}", axes[i].where, shown({settings[i]}), alone.what());
       }
@@ -133,11 +169,18 @@ Variant with_clean_frames(Variant variant) {
   return variant;
 }
 
+std::string camera_text(const std::string& camera, const std::vector<Change>& changes) {
+  std::string text = read_text(find_preset("cameras", "camera", camera));
+  for (const Change& change : changes) text = yaml_with(text, change.path, change.value);
+  return text + "\n";
+}
+
 std::vector<Variant> read_variants(const std::string& text, const std::string& study_file,
-                                   const std::vector<Axis>& axes) {
+                                   const std::vector<Axis>& axes,
+                                   const std::vector<std::string>& cameras) {
   std::vector<Variant> variants;
   for (const auto& settings : combinations(axes))
-    variants.push_back(variant_of_axes(text, study_file, axes, settings));
+    variants.push_back(variant_of_axes(text, study_file, cameras, axes, settings));
   return variants;
 }
 

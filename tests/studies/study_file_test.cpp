@@ -119,7 +119,8 @@ TEST(StudyFile, ABadAxisIsNamedWithItsPlace) {
       "their own");
   EXPECT_EQ(error_of(axes("rendr.sensor.noise: [true]")),
             "study.yaml:3:28: axis 'rendr.sensor.noise': no such setting, expected one of: render, "
-            "recon, scene, resolution, frames, first, calibrate, lens_error, replace; did you mean "
+            "recon, scene, camera, resolution, frames, first, calibrate, lens_error, replace; did "
+            "you mean "
             "'render'?");
   EXPECT_EQ(error_of(kHead + "seeds: [1, 2, 1]\n"), "study.yaml:3:8: seed 1 stands twice");
   EXPECT_EQ(error_of(kHead + "seed: 1\nseeds: [2]\n"),
@@ -169,11 +170,15 @@ TEST(StudyFile, AxesOfBundlesAndOfTheScene) {
             "'wetness'?");
   EXPECT_EQ(error_of(axes("steps: {a: {recn.undistort: true}}")),
             "study.yaml:3:36: axis 'recn.undistort': no such setting, expected one of: render, "
-            "recon, scene, resolution, frames, first, calibrate, lens_error, replace; did you mean "
+            "recon, scene, camera, resolution, frames, first, calibrate, lens_error, replace; did "
+            "you mean "
             "'recon'?");
   EXPECT_EQ(error_of(axes("recon.map.voxel_share: {a: 0.1}")),
             "study.yaml:3:31: axis 'recon.map.voxel_share' is a mapping, expected a list of its "
             "values; only an axis with a name of its own has names for its values");
+  EXPECT_EQ(error_of(axes("camera.sensor.read_noise: [5]")),
+            "study.yaml:3:34: axis camera.sensor.read_noise=5: camera 'misumi-v5506': unknown key "
+            "'read_noise'; did you mean 'read_noise_e'?");
   EXPECT_EQ(error_of(kHead + "scene: {like: stomach, mucossa: {}}\n"),
             "study.yaml:3:8: unknown key 'mucossa'; did you mean 'mucosa'?");
 }
