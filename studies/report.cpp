@@ -9,9 +9,12 @@
 #include "core/presets.h"
 #include "dataset/image_io.h"
 #include "dataset/writer.h"
+#include "studies/frame_pictures.h"
 #include "studies/html.h"
+#include "studies/map_over_truth.h"
 #include "studies/published.h"
 #include "studies/report_parts.h"
+#include "studies/report_view.h"
 
 namespace rugae {
 namespace {
@@ -91,6 +94,7 @@ std::string gates_part(const std::vector<GateOutcome>& gates) {
 // All cells side by side; the paper's numbers in small print.
 std::string overview_part(const std::vector<CellResult>& cells) {
   html::Table table;
+  table.sortable = true;
   table.head = {"Camera",         "trajectory", "method",  "ATE RMSE (mm)", "paper",
                 "map error (mm)", "paper",      "tracked", "seconds"};
   for (const CellResult& cell : cells) {
@@ -133,28 +137,46 @@ std::string chapter(const std::string& title, const std::string& intro, const st
          body + "</section>\n";
 }
 
-std::string cell_chapters(const CellView& view) {
+std::string cell_chapters(const CellView& view, ReportViews* views) {
+  const FramePictures pictures(view, shown_frames(view));
+  const MapOverTruth over = map_over_truth(view);
+  const std::string explore =
+      views
+          ? chapter("Look around",
+                    "Drag to turn, scroll or pinch to come closer, click the path to go there; the "
+                    "arrow keys step along it.",
+                    views->part(view, over, pictures))
+          : "";
   if (view.cell.metrics.contains("failed"))
-    return chapter("Inside the stomach",
-                   "The reconstruction gave up: " +
-                       html::escape(view.cell.metrics.at("failed").get<std::string>()),
-                   frames_part(view));
-  return chapter("Inside the stomach",
+    return explore + chapter("Inside the stomach",
+                             "The reconstruction gave up: " +
+                                 html::escape(view.cell.metrics.at("failed").get<std::string>()),
+                             frames_part(view, pictures));
+  return explore +
+         chapter("Inside the stomach",
                  "Frames along the path, and what the simulator knows about every pixel of them. "
                  "The reconstruction gets the first row alone. Click a picture to enlarge it.",
-                 frames_part(view)) +
+                 frames_part(view, pictures)) +
          chapter("From frames to a map", "What each stage of the reconstruction made of them.",
                  stages_part(view)) +
          chapter("The path", "Where the capsule was, and where the reconstruction thinks it was.",
                  path_part(view)) +
          chapter("The map", "The reconstructed wall, placed by the path, beside the true one.",
-                 map_part(view)) +
+                 map_part(view, over)) +
          chapter("All numbers", "Dashes stand for what could not be measured.", tables_part(view));
+}
+
+// How many cells the page shows in full.
+std::size_t detailed_cells(const std::vector<StudyPart>& parts) {
+  std::size_t count = 0;
+  for (const StudyPart& part : parts)
+    if (part.options.details) count += part.cells.size();
+  return count;
 }
 
 // The chapters of all cells that the study wants shown; those of a single one without a fold.
 std::string cells_part(const std::vector<StudyPart>& parts, std::string& head_cards,
-                       std::string& cover, std::string& lede_text) {
+                       std::string& cover, std::string& lede_text, ReportViews* views) {
   std::string out;
   const bool many = all_cells(parts).size() > 1;
   for (const StudyPart& part : parts)
@@ -171,10 +193,10 @@ std::string cells_part(const std::vector<StudyPart>& parts, std::string& head_ca
         if (!many) head_cards = headline_cards(view);
       }
       if (!part.options.details) continue;
-      if (!many) return cell_chapters(view);
+      if (!many) return cell_chapters(view, views);
       out += fmt::format("<details class=\"cell\" id=\"{}\"><summary>{}</summary>\n",
                          html::escape(cell.cell.name()), html::escape(cell.cell.title())) +
-             headline_cards(view) + cell_chapters(view) + "</details>\n";
+             headline_cards(view) + cell_chapters(view, views) + "</details>\n";
     }
   return out;
 }
@@ -187,6 +209,17 @@ std::string summaries_part(const std::vector<StudyPart>& parts) {
   return out;
 }
 
+constexpr const char* kNoViewer =
+    "<p class=\"note\">This page has no interactive views: <code>viewer/dist/viewer.js</code> was "
+    "not "
+    "there when it was written. <code>scripts/setup.sh</code> builds it.</p>";
+
+// What viewer/build.js makes of viewer/src; empty where it was not built.
+std::string viewer_bundle() {
+  const fs::path file = preset_root() / "viewer" / "dist" / "viewer.js";
+  return fs::exists(file) ? read_text(file) : std::string();
+}
+
 }  // namespace
 
 std::string report_html(const Study& study, const std::vector<StudyPart>& parts) {
@@ -196,7 +229,11 @@ std::string report_html(const Study& study, const std::vector<StudyPart>& parts)
   const std::string page = read_text(file);
   std::map<std::string, std::string> values;
   values["title"] = html::escape(study.title);
-  values["cells"] = cells_part(parts, values["cards"], values["cover"], values["lede"]);
+  const std::string viewer = viewer_bundle();
+  ReportViews views(detailed_cells(parts));
+  values["cells"] = cells_part(parts, values["cards"], values["cover"], values["lede"],
+                               viewer.empty() ? nullptr : &views);
+  values["viewer"] = viewer.empty() ? kNoViewer : "<script>" + viewer + "</script>";
   values["summaries"] = summaries_part(parts);
   values["overview"] = cells.size() > 1 ? overview_part(cells) : "";
   values["gates"] = gates_part(all_gates(parts));
