@@ -233,7 +233,8 @@ std::string report_html(const Study& study, const std::vector<StudyPart>& parts)
   ReportViews views(detailed_cells(parts));
   values["cells"] = cells_part(parts, values["cards"], values["cover"], values["lede"],
                                viewer.empty() ? nullptr : &views);
-  values["viewer"] = viewer.empty() ? kNoViewer : "<script>" + viewer + "</script>";
+  values["viewer"] =
+      viewer.empty() ? kNoViewer : "<script class=\"viewer\">" + viewer + "</script>";
   values["summaries"] = summaries_part(parts);
   values["overview"] = cells.size() > 1 ? overview_part(cells) : "";
   values["gates"] = gates_part(all_gates(parts));

@@ -20,6 +20,7 @@ namespace rugae {
 namespace {
 
 using Json = nlohmann::json;
+namespace fs = std::filesystem;
 
 // Of the whole page; a triangle takes about 13 bytes of it, a frame with its labels 40 thousand.
 constexpr std::size_t kTriangles = 500'000, kStops = 500;
@@ -124,18 +125,23 @@ Json stops_json(const CellView& view, const FramePictures& pictures,
   return out;
 }
 
+// What the colours of a label mean, in a few words.
+std::string key_of(const LabelImage& label, const FramePictures& pictures) {
+  const std::string name = label.name;
+  if (name == "depth")
+    return fmt::format("bright {:g} to dark {:g} mm", pictures.nearest_mm(),
+                       pictures.farthest_mm());
+  if (name == "flow") return fmt::format("full colour: {:g} px", pictures.longest_flow_px());
+  if (name == "normals") return "red right, green up, blue to the camera";
+  if (name == "masks") return "yellow reflects, red saturated, blue leaves, violet hidden next";
+  return label.what;
+}
+
 Json labels_json(const CellView& view, const FramePictures& pictures) {
   Json labels = Json::array();
-  for (const LabelImage& label : label_images()) {
-    if (!has_label(view, label.name, 0) && !has_label(view, label.name, 1)) continue;
-    const std::string name = label.name;
-    std::string key = label.what;
-    if (name == "depth")
-      key =
-          fmt::format("bright {:g} to dark {:g} mm", pictures.nearest_mm(), pictures.farthest_mm());
-    if (name == "flow") key = fmt::format("full colour: {:g} px", pictures.longest_flow_px());
-    labels.push_back({{"name", name}, {"key", key}});
-  }
+  for (const LabelImage& label : label_images())
+    if (has_label(view, label.name, 0) || has_label(view, label.name, 1))  // some lack one end
+      labels.push_back({{"name", label.name}, {"key", key_of(label, pictures)}});
   return labels;
 }
 
@@ -155,7 +161,7 @@ std::string ReportViews::part(const CellView& view, const MapOverTruth& over,
     known = walls_.emplace(hash, Wall{"wall-" + hash, simplified(full_wall, triangles_)}).first;
     Json geometry = packed::mesh(known->second.few);
     geometry["id"] = known->second.id;
-    out += html::json_script("wall", geometry.dump());
+    out += html::json_script("wall-data", geometry.dump());
   }
   const Wall& wall = known->second;
 
@@ -166,6 +172,7 @@ std::string ReportViews::part(const CellView& view, const MapOverTruth& over,
       {"title", view.cell.cell.title()},
       {"wall",
        {{"id", wall.id},
+        {"moves", fs::exists(DatasetLayout{view.cell.dataset}.wall_motion(0))},
         {"seen", packed::shares(seen_vertices(over.visibility, full_wall, wall.few), 1.0)}}},
       {"map", Json()},
       {"error_colours", error_colours()},
@@ -184,7 +191,7 @@ std::string ReportViews::part(const CellView& view, const MapOverTruth& over,
     data["map"]["error"] = packed::shares(carried(over.error_mm, over.map, few), over.worst_mm);
     data["map"]["worst_mm"] = over.worst_mm;
   }
-  return out + "<div class=\"view\">" + html::json_script("view", data.dump()) + "</div>\n";
+  return out + "<div class=\"view\">" + html::json_script("view-data", data.dump()) + "</div>\n";
 }
 
 }  // namespace rugae

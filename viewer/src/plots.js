@@ -25,6 +25,7 @@ function linesPlot(data, width) {
     width,
     height: kHeight_px,
     marginLeft: 54,
+    marginBottom: 44,
     marginTop: marks.length ? 34 : 24,
     marginRight: 24,
     x: {label: data.x.label, nice: true},
@@ -38,6 +39,7 @@ function linesPlot(data, width) {
       Plot.ruleX(marks, {x: "x", stroke: "currentColor", strokeDasharray: "3 4", strokeOpacity: 0.7}),
       Plot.text(marks, {x: "x", text: "label", frameAnchor: "top", dy: -12, fill: "currentColor"}),
       Plot.tip(points, Plot.pointer({
+        maxRadius: 90,
         x: "x",
         y: "y",
         title: (p) => `${p.name}\n${data.x.label}: ${shown(p.x)}\n${data.y.label}: ${shown(p.y)}` +
@@ -55,7 +57,8 @@ function barsPlot(data, width) {
   const end = (bar) => (Number.isNaN(bar.value) ? 0 : Math.max(bar.value, finite(bar.high) ? bar.high : 0, 0));
   return Plot.plot({
     width,
-    height: 56 + kBar_px * bars.length,
+    height: 66 + kBar_px * bars.length,
+    marginBottom: 40,
     marginLeft: Math.min(16 + 7 * longest, width * 0.45),
     marginRight: 64,
     x: {label: data.unit, grid: true, nice: true, zero: true},

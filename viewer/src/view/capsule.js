@@ -1,9 +1,11 @@
 // The camera at the cursor: its frustum with the frame it saw as the far end, and where the estimate thinks it was.
 
 import {
-  BufferAttribute, BufferGeometry, DoubleSide, Group, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, Quaternion,
-  SphereGeometry, SRGBColorSpace, Texture, Vector3,
+  BufferAttribute, BufferGeometry, CanvasTexture, DoubleSide, Group, LinearFilter, LineBasicMaterial, LineSegments, Mesh,
+  MeshBasicMaterial, Quaternion, SphereGeometry, SRGBColorSpace,
 } from "three";
+
+import {element} from "../dom.js";
 
 const kReach_mm = 14;  // from the camera to the frame
 const kEdges = [0, 1, 0, 2, 0, 3, 0, 4, 1, 2, 2, 3, 3, 4, 4, 1];
@@ -12,11 +14,6 @@ const kEdges = [0, 1, 0, 2, 0, 3, 0, 4, 1, 2, 2, 3, 3, 4, 4, 1];
 export function placeAt(object, pose) {
   object.position.set(...pose.slice(0, 3));
   object.quaternion.copy(new Quaternion(...pose.slice(3)));
-}
-
-/** Camera axes: x right, y down, z forward. */
-export function forwardOf(pose) {
-  return new Vector3(0, 0, 1).applyQuaternion(new Quaternion(...pose.slice(3)));
 }
 
 function frustum(cornerRays, material) {
@@ -41,7 +38,6 @@ function screen(corners) {
   return new Mesh(geometry, new MeshBasicMaterial({side: DoubleSide, transparent: true, opacity: 0.94}));
 }
 
-/** Shows `stop` of the view's data; `picture` is an <img> with its frame. */
 export class Capsule {
   constructor(cornerRays) {
     this.group = new Group();
@@ -57,20 +53,27 @@ export class Capsule {
     }
   }
 
+  /** Moves to a stop of the view's data. */
   show(stop) {
     placeAt(this.truth, stop.pose);
     this.estimate.visible = stop.estimate !== null;
     if (stop.estimate) placeAt(this.estimate, stop.estimate);
   }
 
+  /** `picture` is an <img> that has loaded. */
   project(picture) {
     if (!this.screen) return;
-    this.screen.material.map?.dispose();
-    const texture = new Texture(picture);
-    texture.colorSpace = SRGBColorSpace;
-    texture.needsUpdate = true;
-    this.screen.material.map = texture;
-    this.screen.material.needsUpdate = true;
+    const {material} = this.screen, {naturalWidth: width, naturalHeight: height} = picture;
+    if (!material.map) {
+      this.paper = element("canvas", {width, height});
+      material.map = new CanvasTexture(this.paper);
+      material.map.colorSpace = SRGBColorSpace;
+      material.map.generateMipmaps = false;
+      material.map.minFilter = LinearFilter;
+      material.needsUpdate = true;
+    }
+    this.paper.getContext("2d").drawImage(picture, 0, 0);
+    material.map.needsUpdate = true;
     this.screen.visible = true;
   }
 

@@ -27,11 +27,12 @@ function unpacked(path) {
 export class CellView {
   /** Fills `place`; `data` and `wall` are as studies/report_view.cpp writes them. */
   constructor(place, data, wall) {
+    place.view = this;  // so that a console reaches it
     this.data = data;
     this.path = unpacked(data.path);
     this.eye = false;  // looking from the capsule
-    const canvas = element("div", {class: "view-stage", role: "img", "aria-label": "the stomach in three dimensions"});
-    this.stage = new Stage(canvas, (x, y) => this.goNear(x, y));
+    const host = element("div", {class: "view-host", role: "img", "aria-label": "the stomach in three dimensions"});
+    this.stage = new Stage(host, (x, y) => this.goNear(x, y));
     this.wall = wallOf(wall, data.wall.seen);
     this.map = data.map && mapOf(data.map, data.error_colours);
     this.paths = pathsOf(this.path, data.error_colours);
@@ -42,11 +43,12 @@ export class CellView {
     this.facts = element("div", {class: "view-facts", "aria-live": "off"});
     this.pictures = new Pictures(data.labels);
     this.timeline = new Timeline(this.path, data.stops, (k) => this.show(k));
-    canvas.append(this.tools(), this.legend());
-    place.append(canvas, element("div", {class: "view-side"}, this.facts, this.pictures.root), this.timeline.root);
+    const stage = element("div", {class: "view-stage"}, host, this.tools(), this.legend());
+    place.append(stage, element("div", {class: "view-side"}, this.facts, this.pictures.root), this.timeline.root);
     place.tabIndex = 0;
     place.addEventListener("keydown", (event) => this.key(event));
 
+    this.paleWall();
     this.tint();
     onThemeChange(() => this.tint());
     this.wall.geometry.computeBoundingSphere();
@@ -57,6 +59,7 @@ export class CellView {
   tools() {
     const part = (name, object) => toggle(name, true, (on) => {
       object.visible = on;
+      this.paleWall();
       this.stage.invalidate();
     });
     this.eyeButton = toggle("From the capsule", false, (on) => this.look(on));
@@ -69,10 +72,18 @@ export class CellView {
     const {map, error_colours: colours} = this.data;
     const tracked = this.path.error_mm.some(Number.isFinite);
     const line = (name, text) => element("span", {class: "line-key"}, element("i", {class: name}), text);
+    this.wallKey = element("div", {}, line("true", "true path"), line("seen", this.data.wall.moves ? "wall seen, at rest" : "wall seen"),
+                          line("unseen", "never seen"));
     return element("div", {class: "view-legend"},
-                   map ? colourBar("map: distance to the true wall", colours, map.worst_mm) : "",
+                   map ? colourBar("map: distance to the wall", colours, map.worst_mm) : "",
                    tracked ? colourBar("estimated path: error", colours, this.path.worst_mm) : "",
-                   element("div", {}, line("true", "true path"), line("seen", "wall seen"), line("unseen", "never seen")));
+                   this.wallKey);
+  }
+
+  paleWall() {
+    const pale = Boolean(this.map?.visible);
+    this.wall.pale(pale);
+    this.wallKey.classList.toggle("pale", pale);
   }
 
   tint() {

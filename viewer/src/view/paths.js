@@ -31,11 +31,13 @@ export function errorColour(colours, share) {
 /** `path` holds lists of truth_mm, estimate_mm and error_mm. `tint(css)` colours the true path. */
 export function pathsOf(path, errorColours) {
   const group = new Group();
-  const truth = line(path.truth_mm, pieces(path.truth_mm), new LineMaterial({linewidth: 2.2}));
+  // Where both lie together, the thin true path is drawn over the wide estimate.
+  const over = {polygonOffset: true, polygonOffsetFactor: 0, polygonOffsetUnits: -30};
+  const truth = line(path.truth_mm, pieces(path.truth_mm), new LineMaterial({linewidth: 1.8, ...over}));
   group.add(truth);
   const ends = pieces(path.estimate_mm);
   if (ends.length) {
-    const estimate = line(path.estimate_mm, ends, new LineMaterial({linewidth: 3.4, vertexColors: true}));
+    const estimate = line(path.estimate_mm, ends, new LineMaterial({linewidth: 5, vertexColors: true}));
     estimate.geometry.setColors(ends.flatMap((i) => errorColour(errorColours, path.error_mm[i] / path.worst_mm).toArray()));
     group.add(estimate);
   }

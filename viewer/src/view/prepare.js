@@ -5,8 +5,8 @@ import {CellView} from "./cell_view.js";
 const json = (script) => JSON.parse(script.textContent);
 
 function build(place) {
-  const data = json(place.querySelector("script.view"));
-  const walls = [...document.querySelectorAll("script.wall")];
+  const data = json(place.querySelector("script.view-data"));
+  const walls = [...document.querySelectorAll("script.wall-data")];
   // The id is looked for in the text, so that other walls need not be parsed.
   const wall = walls.find((script) => script.textContent.includes(`"${data.wall.id}"`));
   if (!wall) throw new Error(`view '${data.title}': the page has no wall '${data.wall.id}'`);

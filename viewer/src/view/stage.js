@@ -35,7 +35,7 @@ export class Stage {
   wake() {
     if (this.renderer) return;
     try {
-      this.renderer = new WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true});
+      this.renderer = new WebGLRenderer({antialias: true, alpha: true});
     } catch {
       this.host.classList.add("no-webgl");
       return;
@@ -78,7 +78,7 @@ export class Stage {
     this.controls.enabled = true;
     this.controls.target.copy(sphere.center);
     this.controls.maxDistance = 12 * sphere.radius;
-    this.camera.position.copy(sphere.center).addScaledVector(kFrom, (0.86 * sphere.radius) / Math.sin(halfAngle));
+    this.camera.position.copy(sphere.center).addScaledVector(kFrom, (1.02 * sphere.radius) / Math.sin(halfAngle));
     this.controls.update();
     this.invalidate();
   }

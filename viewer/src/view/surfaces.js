@@ -8,7 +8,8 @@ import {
 
 import {uint16, uint32, uint8} from "./bytes.js";
 
-const kSeen = [0.86, 0.55, 0.47], kUnseen = [0.58, 0.6, 0.64];  // as in the page's pictures of the wall
+// Never seen and seen, as in the page's pictures of the wall; paler beside a map, whose colours then speak alone.
+const kWall = [[0.58, 0.6, 0.64], [0.86, 0.55, 0.47]], kPaleWall = [[0.66, 0.67, 0.7], [0.95, 0.86, 0.8]];
 
 function geometryOf(packed) {
   const numbers = uint16(packed.points);
@@ -22,14 +23,14 @@ function geometryOf(packed) {
 }
 
 /** Vertex colours from a share of 255 each, through a list of sRGB colours. */
-function colour(geometry, shares, colours) {
+function coloursOf(shares, colours) {
   const linear = colours.map(([r, g, b]) => new Color().setRGB(r, g, b, SRGBColorSpace));
   const values = new Float32Array(3 * shares.length);
   shares.forEach((share, i) => {
     const at = (share / 255) * (linear.length - 1), low = Math.min(Math.floor(at), linear.length - 2);
     linear[low].clone().lerp(linear[low + 1], at - low).toArray(values, 3 * i);
   });
-  geometry.setAttribute("color", new BufferAttribute(values, 3));
+  return new BufferAttribute(values, 3);
 }
 
 /** The side that is near, as thin glass: only its rim shows. */
@@ -49,20 +50,25 @@ function glass(geometry) {
     fragmentShader: `
       uniform vec3 tint;
       varying float facing;
-      void main() { gl_FragColor = vec4(tint, 0.02 + 0.3 * pow(1.0 - facing, 3.0)); }`,
+      void main() { gl_FragColor = vec4(tint, 0.02 + 0.45 * pow(1.0 - facing, 2.5)); }`,
   });
   return new Mesh(geometry, material);
 }
 
-/** The wall: rose where the capsule saw it, gray where it never did. `tint(colour)` colours the glass. */
+/**
+ * The wall: rose where the capsule saw it, gray where it never did. `tint(css)` colours the glass, `pale(on)` makes room for
+ * the colours of a map.
+ */
 export function wallOf(packed, seen) {
   const geometry = geometryOf(packed);
-  colour(geometry, uint8(seen), [kUnseen, kSeen]);
+  const shares = uint8(seen), full = coloursOf(shares, kWall), paler = coloursOf(shares, kPaleWall);
   const material = new MeshPhongMaterial({vertexColors: true, side: BackSide, shininess: 28, specular: 0x2a1c1a});
   const near = glass(geometry);
   const group = new Group();
   group.add(new Mesh(geometry, material), near);
   group.tint = (css) => near.material.uniforms.tint.value.set(css);
+  group.pale = (on) => geometry.setAttribute("color", on ? paler : full);
+  group.pale(false);
   group.geometry = geometry;
   return group;
 }
@@ -73,7 +79,7 @@ export function wallOf(packed, seen) {
  */
 export function mapOf(packed, errorColours) {
   const geometry = geometryOf(packed);
-  colour(geometry, uint8(packed.error), errorColours);
+  geometry.setAttribute("color", coloursOf(uint8(packed.error), errorColours));
   const material = new MeshLambertMaterial({vertexColors: true, side: BackSide});
   const nearer_mm = Math.min(2 * packed.worst_mm, 12);
   material.onBeforeCompile = (shader) => {
