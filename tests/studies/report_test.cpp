@@ -74,6 +74,7 @@ class ReportWithTree : public Report {
     std::filesystem::create_directories(tree_ / "viewer" / "dist");
     std::filesystem::copy_file(preset_root() / "viewer" / "report.html",
                                tree_ / "viewer" / "report.html");
+    std::filesystem::create_directory_symlink(preset_root() / "studies", tree_ / "studies");
     if (const char* home = std::getenv("RUGAE_HOME")) home_before_ = home;
     setenv("RUGAE_HOME", tree_.c_str(), 1);
   }

@@ -64,7 +64,8 @@ function barsPlot(data, width) {
     x: {label: data.unit, grid: true, nice: true, zero: true},
     y: {label: null, domain: bars.map((bar) => bar.name), tickSize: 0},
     marks: [
-      Plot.barX(bars, {x: "value", y: "name", fill: "var(--rose)", fillOpacity: 0.85, inset: 4, rx: 3}),
+      Plot.barX(bars.filter((bar) => !Number.isNaN(bar.value)),
+                {x: "value", y: "name", fill: "var(--rose)", fillOpacity: 0.85, insetTop: 4, insetBottom: 4}),
       Plot.ruleY(whiskers, {x1: "low", x2: "high", y: "name", stroke: "currentColor", strokeWidth: 1.5}),
       Plot.tickX(whiskers.flatMap((w) => [{...w, at: w.low}, {...w, at: w.high}]),
                  {x: "at", y: "name", stroke: "currentColor", inset: 9}),

@@ -1,12 +1,12 @@
 // The page of a small study in a browser without a screen, opened from disk. RUGAE_PROGRAM names the program that makes it,
-// CHROMIUM the browser, if it is not /usr/bin/chromium.
+// CHROMIUM the browser, if it is not /usr/bin/chromium. RUGAE_STUDY, if given, names the folder of a study made before.
 
 import assert from "node:assert/strict";
 import {after, before, test} from "node:test";
 import {pathToFileURL} from "node:url";
 import {chromium} from "playwright-core";
 
-import {middleOf, shareDifferent} from "./pixels.js";
+import {middleOf, shareDifferent, show} from "./pixels.js";
 import {makeStudy, pageWithPlots} from "./study.js";
 
 const kBrowser = {
@@ -15,12 +15,14 @@ const kBrowser = {
   args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
 };
 
+const kPatience_ms = 60_000;  // of a busy machine without a graphics card
+
 let study, file, browser;
 
 before(async () => {
-  const program = process.env.RUGAE_PROGRAM;
-  assert.ok(program, "RUGAE_PROGRAM names no program");
-  study = makeStudy(program);
+  const {RUGAE_PROGRAM: program, RUGAE_STUDY: finished} = process.env;
+  assert.ok(program || finished, "RUGAE_PROGRAM names no program");
+  study = finished ? {folder: finished, remove() {}} : makeStudy(program);
   file = pageWithPlots(study.folder);
   browser = await chromium.launch(kBrowser);
 });
@@ -32,7 +34,7 @@ after(async () => {
 
 /** Opens the page, gives it to `look`, and fails on whatever it told the console or asked of the network. */
 async function visit(look, options = {}) {
-  const context = await browser.newContext({viewport: {width: 1300, height: 900}, ...options});
+  const context = await browser.newContext({viewport: {width: 1000, height: 700}, ...options});
   const page = await context.newPage();
   const complaints = [];
   page.on("console", (message) => {
@@ -45,7 +47,7 @@ async function visit(look, options = {}) {
     const url = request.url();
     if (!/^(data|blob):/.test(url) && url.split("#")[0] !== pathToFileURL(file).href) complaints.push(`asks for ${url}`);
   });
-  page.setDefaultTimeout(20_000);
+  page.setDefaultTimeout(kPatience_ms);
   await page.goto(pathToFileURL(file).href);
   await look(page);
   await page.waitForTimeout(200);
@@ -57,7 +59,7 @@ async function visit(look, options = {}) {
 async function openCell(page, method) {
   await page.locator("tr.opens", {hasText: method}).first().locator("td").nth(3).click();
   const view = page.locator("details[open] .view").first();
-  await view.scrollIntoViewIfNeeded();
+  await show(view);
   await view.locator("canvas").waitFor();
   await page.waitForFunction(() => document.querySelector("details[open] .view-frame img")?.naturalWidth > 0);
   return view;
@@ -127,7 +129,7 @@ test("arrow keys and a click on the path move the cursor", () => visit(async (pa
   await page.keyboard.press("ArrowLeft");
   assert.match(await shownWhere(view), /^frame 10 /);
   const host = view.locator(".view-host");
-  await host.scrollIntoViewIfNeeded();
+  await show(host);
   const at = await view.evaluate((place) => place.view.stage.onScreen(place.view.path.truth_mm[0]));
   const box = await host.boundingBox();
   await page.mouse.click(box.x + at[0], box.y + at[1]);
@@ -210,8 +212,8 @@ for (const [name, options] of [["dark", {colorScheme: "dark"}],
                                ["narrow", {viewport: {width: 390, height: 800}, hasTouch: true, isMobile: true}]])
   test(`it holds on a ${name} screen`, () => visit(async (page) => {
     const view = await openCell(page, "paper");
-    const {clientWidth, scrollWidth} = await page.evaluate(() => document.documentElement);
-    assert.ok(scrollWidth <= clientWidth, `${scrollWidth} px of page on ${clientWidth} px of screen`);
+    const [has, needs] = await page.evaluate(() => [document.documentElement.clientWidth, document.documentElement.scrollWidth]);
+    assert.ok(needs <= has, `${needs} px of page on ${has} px of screen`);
     const host = view.locator(".view-host"), before = await middleOf(page, host);
     await view.getByRole("button", {name: "Wall", exact: true}).click();
     assert.ok(shareDifferent(before, await middleOf(page, host)) > 0.1);

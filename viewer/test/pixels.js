@@ -1,8 +1,11 @@
 // What a part of the page looks like, as numbers.
 
+/** Scrolls there at once. */
+export const show = (locator) => locator.evaluate((element) => element.scrollIntoView({block: "center", behavior: "instant"}));
+
 /** RGBA of the middle of an element, as it is on the screen, without what lies over its edges. */
 export async function middleOf(page, locator) {
-  await locator.scrollIntoViewIfNeeded();
+  await show(locator);
   await page.waitForTimeout(300);  // what was asked for is drawn in the frames that follow
   const box = await locator.boundingBox();
   const clip = {x: box.x + 0.1 * box.width, y: box.y + 0.2 * box.height, width: 0.8 * box.width, height: 0.55 * box.height};

@@ -1,4 +1,4 @@
-// A small real study and its page: a small camera on a short path, 12 frames, two settings, each reconstructed and given up.
+// A small real study and its page: a small camera on a short path, 12 or 10 frames, each reconstructed and given up.
 
 import {execFileSync} from "node:child_process";
 import {mkdtempSync, readFileSync, rmSync, writeFileSync} from "node:fs";
@@ -17,12 +17,11 @@ sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 10000, read_noi
   writeFileSync(join(folder, "short.yaml"), 'like: "1"\nlength_cm: 4\npasses: 1\n');
   writeFileSync(join(folder, "study.yaml"), `title: A small study
 resolution: coarse
-frames: 12
 cameras: [${folder}/small.yaml]
 trajectories: [${folder}/short.yaml]
 commands: {nothing: ["/bin/false"]}
 methods: [paper, nothing]
-axes: {recon.preprocess.undistort: [true, false]}
+axes: {frames: [12, 10]}
 `);
   execFileSync(program, ["run", join(folder, "study.yaml"), "--out", join(folder, "out")], {stdio: ["ignore", "ignore", "inherit"]});
   return {folder, remove: () => rmSync(folder, {recursive: true, force: true})};
