@@ -221,11 +221,10 @@ for (const [name, options] of [["dark", {colorScheme: "dark"}],
 
 test("light turns dark while the page is open", () => visit(async (page) => {
   const view = await openCell(page, "paper");
-  const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
   const path = () => view.evaluate((place) => place.view.capsule.trueMaterial.color.getHexString());
-  const light = [await ground(), await path()];
+  const light = await path();
   await page.emulateMedia({colorScheme: "dark"});
-  await page.waitForTimeout(200);
-  assert.notEqual(await ground(), light[0]);
-  assert.notEqual(await path(), light[1]);
+  await page.waitForFunction((before) =>
+    document.querySelector("details[open] .view").view.capsule.trueMaterial.color.getHexString() !== before, light);
+  assert.equal(await path(), "f2e8e2", "the page's ink on dark");
 }));
