@@ -1,6 +1,8 @@
 #include "studies/report.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -9,9 +11,13 @@
 #include "core/presets.h"
 #include "dataset/image_io.h"
 #include "dataset/writer.h"
+#include "studies/cell_files.h"
+#include "studies/frame_pictures.h"
 #include "studies/html.h"
+#include "studies/map_over_truth.h"
 #include "studies/published.h"
 #include "studies/report_parts.h"
+#include "studies/report_view.h"
 
 namespace rugae {
 namespace {
@@ -91,6 +97,7 @@ std::string gates_part(const std::vector<GateOutcome>& gates) {
 // All cells side by side; the paper's numbers in small print.
 std::string overview_part(const std::vector<CellResult>& cells) {
   html::Table table;
+  table.sortable = true;
   table.head = {"Camera",         "trajectory", "method",  "ATE RMSE (mm)", "paper",
                 "map error (mm)", "paper",      "tracked", "seconds"};
   for (const CellResult& cell : cells) {
@@ -133,32 +140,55 @@ std::string chapter(const std::string& title, const std::string& intro, const st
          body + "</section>\n";
 }
 
-std::string cell_chapters(const CellView& view) {
+std::string cell_chapters(const CellView& view, ReportViews* views) {
+  const FramePictures pictures(view, shown_frames(view));
+  const MapOverTruth over = map_over_truth(view);
+  const std::string explore =
+      views
+          ? chapter("Look around",
+                    "Drag to turn, scroll or pinch to come closer, click the path to go there; the "
+                    "arrow keys step along it.",
+                    views->part(view, over, pictures))
+          : "";
   if (view.cell.metrics.contains("failed"))
-    return chapter("Inside the stomach",
-                   "The reconstruction gave up: " +
-                       html::escape(view.cell.metrics.at("failed").get<std::string>()),
-                   frames_part(view));
-  return chapter("Inside the stomach",
+    return explore + chapter("Inside the stomach",
+                             "The reconstruction gave up: " +
+                                 html::escape(view.cell.metrics.at("failed").get<std::string>()),
+                             frames_part(view, pictures));
+  return explore +
+         chapter("Inside the stomach",
                  "Frames along the path, and what the simulator knows about every pixel of them. "
                  "The reconstruction gets the first row alone. Click a picture to enlarge it.",
-                 frames_part(view)) +
+                 frames_part(view, pictures)) +
          chapter("From frames to a map", "What each stage of the reconstruction made of them.",
                  stages_part(view)) +
          chapter("The path", "Where the capsule was, and where the reconstruction thinks it was.",
                  path_part(view)) +
          chapter("The map", "The reconstructed wall, placed by the path, beside the true one.",
-                 map_part(view)) +
+                 map_part(view, over)) +
          chapter("All numbers", "Dashes stand for what could not be measured.", tables_part(view));
 }
 
 bool has_loop(const StudyPart& part) { return part.options.measure == Measure::loop; }
 
+// A cell whose process was killed while it simulated has nothing to show.
+bool has_frames(const CellResult& cell) { return dataset_finished(cell.dataset); }
+
 std::vector<CellResult> loop_cells(const std::vector<StudyPart>& parts) {
   std::vector<CellResult> cells;
   for (const StudyPart& part : parts)
-    if (has_loop(part)) cells.insert(cells.end(), part.cells.begin(), part.cells.end());
+    if (has_loop(part)) std::ranges::copy_if(part.cells, std::back_inserter(cells), has_frames);
   return cells;
+}
+
+std::string failures_part(const std::vector<CellResult>& cells) {
+  html::Table table;
+  table.head = {"Cell", "why it failed"};
+  for (const CellResult& cell : cells)
+    if (cell.metrics.contains("failed"))
+      table.rows.push_back({html::escape(cell.cell.title()),
+                            html::escape(cell.metrics.at("failed").get<std::string>())});
+  return table.rows.empty() ? std::string() : chapter("Cells that failed", "", table.str());
 }
 
 Estimate estimate_of(const CellResult& cell) {
@@ -166,11 +196,21 @@ Estimate estimate_of(const CellResult& cell) {
   return cell.metrics.contains("failed") || !there ? Estimate{} : read_estimate(cell.estimate);
 }
 
+// How many cells the page shows in full.
+std::size_t detailed_cells(const std::vector<StudyPart>& parts) {
+  std::size_t count = 0;
+  for (const StudyPart& part : parts)
+    if (part.options.details && has_loop(part)) count += part.cells.size();
+  return count;
+}
+
 // The head of the page: of the first cell, where there is one of the whole loop.
 void fill_head(const std::vector<StudyPart>& parts, std::map<std::string, std::string>& values) {
   std::vector<CellResult> cells = loop_cells(parts);
   const bool loop = !cells.empty();
-  if (!loop) cells = all_cells(parts);
+  if (!loop) std::ranges::copy_if(all_cells(parts), std::back_inserter(cells), has_frames);
+  check(!cells.empty(), "report: no cell of the study has frames; the first failed: {}",
+        all_cells(parts)[0].metrics.value("failed", "without a reason"));
   const Truth truth = Truth::open(cells[0].dataset);
   const Estimate estimate = estimate_of(cells[0]);
   const bool many = cells.size() > 1;
@@ -181,19 +221,20 @@ void fill_head(const std::vector<StudyPart>& parts, std::map<std::string, std::s
 }
 
 // The chapters of all cells that the study wants shown; those of a single one without a fold.
-std::string cells_part(const std::vector<StudyPart>& parts) {
+std::string cells_part(const std::vector<StudyPart>& parts, ReportViews* views) {
   std::string out;
   const bool many = loop_cells(parts).size() > 1;
   for (const StudyPart& part : parts) {
     if (!part.options.details || !has_loop(part)) continue;
     for (const CellResult& cell : part.cells) {
+      if (!has_frames(cell)) continue;
       const Truth truth = Truth::open(cell.dataset);
       const Estimate estimate = estimate_of(cell);
       const CellView view{cell, truth, estimate, many};
-      if (!many) return cell_chapters(view);
+      if (!many) return cell_chapters(view, views);
       out += fmt::format("<details class=\"cell\" id=\"{}\"><summary>{}</summary>\n",
                          html::escape(cell.cell.name()), html::escape(cell.cell.title())) +
-             headline_cards(view) + cell_chapters(view) + "</details>\n";
+             headline_cards(view) + cell_chapters(view, views) + "</details>\n";
     }
   }
   return out;
@@ -207,6 +248,17 @@ std::string summaries_part(const std::vector<StudyPart>& parts) {
   return out;
 }
 
+constexpr const char* kNoViewer =
+    "<p class=\"note\">This page has no interactive views: <code>viewer/dist/viewer.js</code> was "
+    "not "
+    "there when it was written. <code>scripts/setup.sh</code> builds it.</p>";
+
+// What viewer/build.js makes of viewer/src; empty where it was not built.
+std::string viewer_bundle() {
+  const fs::path file = preset_root() / "viewer" / "dist" / "viewer.js";
+  return fs::exists(file) ? read_text(file) : std::string();
+}
+
 }  // namespace
 
 std::string report_html(const Study& study, const std::vector<StudyPart>& parts) {
@@ -217,10 +269,14 @@ std::string report_html(const Study& study, const std::vector<StudyPart>& parts)
   std::map<std::string, std::string> values;
   values["title"] = html::escape(study.title);
   fill_head(parts, values);
-  values["cells"] = cells_part(parts);
+  const std::string viewer = viewer_bundle();
+  ReportViews views(detailed_cells(parts));
+  values["cells"] = cells_part(parts, viewer.empty() ? nullptr : &views);
+  values["viewer"] =
+      viewer.empty() ? kNoViewer : "<script class=\"viewer\">" + viewer + "</script>";
   values["summaries"] = summaries_part(parts);
   const std::vector<CellResult> loop = loop_cells(parts);
-  values["overview"] = loop.size() > 1 ? overview_part(loop) : "";
+  values["overview"] = (loop.size() > 1 ? overview_part(loop) : "") + failures_part(cells);
   values["gates"] = gates_part(all_gates(parts));
   std::string texts = study.text;
   if (parts.size() > 1)

@@ -4,14 +4,13 @@
 #include <cctype>
 #include <cmath>
 #include <map>
-#include <opencv2/imgproc.hpp>
 
 #include "core/check.h"
 #include "dataset/colours.h"
-#include "dataset/frame_sheet.h"
 #include "dataset/image_io.h"
 #include "dataset/label_images.h"
 #include "dataset/layout.h"
+#include "studies/frame_pictures.h"
 #include "studies/html.h"
 #include "studies/report_parts.h"
 
@@ -26,39 +25,6 @@ std::vector<int> spread(int frames, int count) {
   for (int k = 0; k < count; ++k)
     chosen.push_back(static_cast<int>(std::lround((k + 0.5) * last / count)));
   return chosen;
-}
-
-bool has_label(const CellView& view, const std::string& name, int frame) {
-  return std::filesystem::exists(label_image(name).file(DatasetLayout{view.cell.dataset}, frame));
-}
-
-struct Range {
-  double low, high;
-};
-
-// Over all the frames together, so that one far corner does not take all colours.
-Range depth_range(const CellView& view, const std::vector<int>& frames) {
-  cv::Mat all;
-  for (const int i : frames)
-    if (has_label(view, "depth", i)) all.push_back(view.truth.depth_mm(i));
-  if (all.empty()) return {0.0, 1.0};
-  constexpr double kLow = 0.01, kHigh = 0.97;
-  const double low = quantile(all, kLow), high = quantile(all, kHigh);
-  if (!std::isfinite(low)) return {0.0, 1.0};
-  return {std::floor(low), std::max(std::ceil(high), std::floor(low) + 1.0)};
-}
-
-double longest_flow_px(const CellView& view, const std::vector<int>& frames) {
-  double longest = 1.0;
-  for (const int i : frames) {
-    if (!has_label(view, "flow", i)) continue;
-    cv::Mat parts[2], length;
-    cv::split(view.truth.flow_px(i), parts);
-    cv::magnitude(parts[0], parts[1], length);
-    const double high = quantile(length, 0.95);
-    if (std::isfinite(high)) longest = std::max(longest, high);
-  }
-  return std::ceil(longest);
 }
 
 std::string row(const std::string& name, const std::string& key,
@@ -79,37 +45,29 @@ std::string cell_picture(const std::string& uri, const std::string& what, const 
 
 }  // namespace
 
+std::vector<int> shown_frames(const CellView& view) {
+  return spread(view.truth.size(), view.many_cells ? 3 : 5);
+}
+
 std::string cover_picture(const CellView& view) {
   const int frame = view.truth.size() / 3;
   return html::jpeg(read_image_bgr(DatasetLayout{view.cell.dataset}.frame(frame)), 720, 88);
 }
 
-std::string frames_part(const CellView& view) {
-  const std::vector<int> frames = spread(view.truth.size(), view.many_cells ? 3 : 5);
+std::string frames_part(const CellView& view, const FramePictures& pictures) {
+  const std::vector<int> frames = shown_frames(view);
   const int width_px = view.many_cells ? 400 : 640;
-  const Range depth = depth_range(view, frames);
-  const double longest = longest_flow_px(view, frames);
-  const DatasetLayout layout{view.cell.dataset};
   // Pictures of each row by the name of the label; the observations under "".
   std::map<std::string, std::vector<std::string>> rows;
   std::string times;
   for (const int i : frames) {
-    const cv::Mat bgr = read_image_bgr(layout.frame(i));
     const auto add = [&](const std::string& name, const std::string& what, const cv::Mat& image) {
       rows[name].push_back(cell_picture(html::jpeg(image, width_px), what, view, i));
     };
-    add("", "observation", bgr);
-    for (const LabelImage& label : label_images()) {
-      if (!has_label(view, label.name, i)) continue;
-      const std::string name = label.name;
-      const cv::Mat image = view.truth.label(name, i);
-      if (name == "depth")
-        add(name, "true depth", depth_picture(image, depth.low, depth.high));
-      else if (name == "flow")
-        add(name, "true flow to the next frame", flow_picture(image, longest));
-      else
-        add(name, std::string("true ") + label.what, label_picture(label, image, bgr));
-    }
+    add("", "observation", pictures.observation(i));
+    for (const LabelImage& label : label_images())
+      if (has_label(view, label.name, i))
+        add(label.name, std::string("true ") + label.what, pictures.label(label.name, i));
     times +=
         fmt::format("<span>frame {} &middot; {:.2f} s</span>", i, view.truth.track()[i].time_s);
   }
@@ -125,12 +83,12 @@ std::string frames_part(const CellView& view) {
           fmt::format("<p>along the optical axis</p><div class=\"bar\" "
                       "style=\"background:{}\"></div><div class=\"ends\"><span>{:g}</span>"
                       "<span>{:g} mm +</span></div>",
-                      depth_gradient_css(), depth.low, depth.high));
+                      depth_gradient_css(), pictures.nearest_mm(), pictures.farthest_mm()));
   add_row("normals", "Normals", "<p>red: right, green: up, blue: towards the camera</p>");
   add_row("flow", "Flow",
           fmt::format("<p>to the next frame; rim of the disc: {:g} px</p><img class=\"wheel\" "
                       "src=\"{}\" alt=\"flow colours\">",
-                      longest, html::png(flow_wheel(96))));
+                      pictures.longest_flow_px(), html::png(flow_wheel(96))));
   add_row("masks", "Masks", "<p>" + mask_key_html() + "</p>");
   for (const LabelImage& label : label_images()) {
     const std::string name = label.name;

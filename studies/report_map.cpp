@@ -1,36 +1,21 @@
 // The map over the true wall.
 
-#include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "core/check.h"
 #include "dataset/colours.h"
 #include "render/shaded_view.h"
 #include "studies/html.h"
+#include "studies/map_over_truth.h"
 #include "studies/plots.h"
 #include "studies/report_parts.h"
-#include "validate/align.h"
-#include "validate/metrics_json.h"
 #include "validate/surface_error.h"
-#include "validate/visibility.h"
 
 namespace rugae {
 namespace {
 
 constexpr int kWidth_px = 620, kHeight_px = 560;
 const Vec3f kSeen_srgb(0.86f, 0.55f, 0.47f), kUnseen_srgb(0.58f, 0.60f, 0.64f);
-
-// From at most this many frames, in equal steps: enough for a picture of what was seen.
-Visibility visibility_of(const Truth& truth) {
-  constexpr int kMostFrames = 150;
-  Visibility visibility(truth.wall(), {});
-  const int step = (truth.size() + kMostFrames - 1) / kMostFrames;
-  for (int i = 0; i < truth.size(); i += step)
-    visibility.add(truth.camera().lens, truth.track()[i].world_from_camera, truth.depth_mm(i));
-  return visibility;
-}
 
 TriangleMesh wall_with_seen_part(const TriangleMesh& wall, const Visibility& visibility) {
   TriangleMesh coloured = wall;
@@ -50,23 +35,6 @@ TriangleMesh coloured_by_error(const TriangleMesh& map, const std::vector<double
     coloured.colors[v] = error_colour(error_mm[v] / worst_mm);
   if (coloured.normals.empty()) coloured.normals = angle_weighted_normals(coloured);
   return coloured;
-}
-
-// Triangles turned so that they face out of the organ, as the wall's do: seen by most of them,
-// since a method may wind its map either way.
-TriangleMesh facing_as(TriangleMesh map, const TriangleMesh& wall) {
-  const ClosestPoint closest(wall);
-  constexpr std::size_t kLookedAt = 2000;
-  const std::size_t step = map.triangles.size() / kLookedAt + 1;
-  double agreement = 0.0;
-  for (std::size_t t = 0; t < map.triangles.size(); t += step) {
-    const int beside = closest(map.vertices[map.triangles[t][0]]).triangle;
-    agreement += triangle_normal(map, t).dot(triangle_normal(wall, beside));
-  }
-  if (agreement >= 0.0) return map;
-  for (Vec3i& triangle : map.triangles) std::swap(triangle[1], triangle[2]);
-  map.normals.clear();
-  return map;
 }
 
 cv::Mat view_into(const TriangleMesh& mesh, const Eigen::AlignedBox3d& box, const Side& side,
@@ -104,32 +72,17 @@ std::string figure(const cv::Mat& image, const Side& side, const std::string& al
 
 }  // namespace
 
-std::string map_part(const CellView& view) {
-  const Truth& truth = view.truth;
-  const Visibility visibility = visibility_of(truth);
-  const TriangleMesh wall = wall_with_seen_part(truth.wall(), visibility);
+std::string map_part(const CellView& view, const MapOverTruth& over) {
+  const TriangleMesh wall = wall_with_seen_part(view.truth.wall(), over.visibility);
   const Eigen::AlignedBox3d box = bounding_box(wall);
-  const auto to_truth = transform_from_json(view.cell.metrics.at("alignment"));
   std::string out;
   const std::string note = view.cell.metrics.at("surface").at("note");
   if (!note.empty()) out += "<p class=\"note\">" + html::escape(note) + "</p>";
 
-  TriangleMesh map, errors;
-  double worst_mm = 1.0;
-  const bool has_map = to_truth && !view.estimate.map.empty() && !visibility.seen_wall().empty();
-  if (has_map) {
-    map = facing_as(transformed(view.estimate.map, *to_truth), truth.wall());
-    if (map.normals.empty()) map.normals = angle_weighted_normals(map);
-    const std::vector<double> error_mm = distances_mm(map.vertices, visibility.seen_wall());
-    std::vector<double> sorted = error_mm;
-    std::ranges::sort(sorted);
-    constexpr double kMost = 0.95;
-    const double high = sorted[static_cast<std::size_t>(kMost * (sorted.size() - 1.0))];
-    const double step = nice_step(std::max(high, 1e-6), 4);
-    worst_mm = step * std::max(1.0, std::ceil(high / step));
-    errors = coloured_by_error(map, error_mm, worst_mm);
-  }
-  out += fmt::format("<div class=\"maps\" style=\"--columns:{}\">", has_map ? 3 : 1);
+  const TriangleMesh& map = over.map;
+  TriangleMesh errors;
+  if (over.has_map()) errors = coloured_by_error(map, over.error_mm, over.worst_mm);
+  out += fmt::format("<div class=\"maps\" style=\"--columns:{}\">", over.has_map() ? 3 : 1);
   TriangleMesh clay = wall;
   clay.colors.clear();
   for (const Side& side : two_sides()) {
@@ -137,7 +90,7 @@ std::string map_part(const CellView& view) {
                   "The true wall, " + side.name +
                       ", looking in through the near side. Rose: seen by the capsule; gray: never "
                       "seen.");
-    if (!has_map) continue;
+    if (!over.has_map()) continue;
     const cv::Mat shape = view_into(clay, box, side, 1.0f);
     out += figure(map_over_wall(map, shape, box, side), side, "reconstructed map",
                   "The reconstructed map in its own colours, over the true wall (pale).");
@@ -145,18 +98,17 @@ std::string map_part(const CellView& view) {
                   "The map coloured by its distance to the wall that was seen.");
   }
   out += "</div>\n";
-  if (!has_map) return out;
+  if (!over.has_map()) return out;
   out += fmt::format(
       "<div class=\"legend\">distance to the true wall: 0 <span class=\"bar inline\" "
       "style=\"background:{}\"></span> {:g} mm and more</div>\n",
-      error_gradient_css(), worst_mm);
+      error_gradient_css(), over.worst_mm);
 
   constexpr std::size_t kSamples = 20'000;
-  const TriangleMesh seen = visibility.seen_wall();
-  const auto of_map = distances_mm(sample_surface(map, kSamples), seen);
-  const auto of_wall = distances_mm(sample_surface(seen, kSamples), map);
+  const auto of_map = distances_mm(sample_surface(map, kSamples), over.seen_wall);
+  const auto of_wall = distances_mm(sample_surface(over.seen_wall, kSamples), map);
   out += "<figure class=\"half\">" +
-         cumulative_svg({{"map", "a", of_map}, {"wall", "b", of_wall}}, 2.0 * worst_mm) +
+         cumulative_svg({{"map", "a", of_map}, {"wall", "b", of_wall}}, 2.0 * over.worst_mm) +
          "<figcaption><span class=\"line a\"></span>share of the map within a distance of the seen "
          "wall (accuracy) <span class=\"line b\"></span>share of the seen wall within a distance "
          "of the map (completeness)</figcaption></figure>\n";

@@ -33,7 +33,15 @@ std::vector<Vec3> points(const json& list) {
 
 }  // namespace
 
-std::string path_part(const CellView& view) {
+PathPlot path_plot(const CellView& view) {
+  if (!view.cell.metrics.contains("frames")) {
+    PathPlot plot;
+    for (const TimedPose& pose : view.truth.track())
+      plot.truth_mm.push_back(pose.world_from_camera.translation);
+    plot.estimate_mm.assign(plot.truth_mm.size(), Vec3::Constant(kNan));
+    plot.error_mm.assign(plot.truth_mm.size(), kNan);
+    return plot;
+  }
   const json& frames = view.cell.metrics.at("frames");
   PathPlot plot{points(frames.at("truth_mm")), points(frames.at("estimate_mm")),
                 numbers(frames.at("position_error_mm")), 1.0};
@@ -42,7 +50,12 @@ std::string path_part(const CellView& view) {
     if (std::isfinite(e)) worst = std::max(worst, e);
   const double step = nice_step(std::max(worst, 1e-6), 4);
   plot.worst_mm = step * std::max(1.0, std::ceil(worst / step));
+  return plot;
+}
 
+std::string path_part(const CellView& view) {
+  const json& frames = view.cell.metrics.at("frames");
+  const PathPlot plot = path_plot(view);
   std::string out = "<div class=\"sides\">";
   for (const Side& side : two_sides())
     out += "<figure>" + path_svg(plot, view.truth.wall(), side) + "<figcaption>Seen " + side.name +

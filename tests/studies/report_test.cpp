@@ -2,36 +2,22 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/files.h"
+#include "core/presets.h"
 #include "studies/html.h"
 #include "studies/plots.h"
 #include "studies/tables.h"
+#include "tests/studies/from_base64.h"
 #include "tests/studies/inside_sphere.h"
+#include "tests/studies/page_without_viewer.h"
 #include "tests/studies/temporary_folder.h"
 #include "validate/evaluate.h"
 
 namespace rugae {
 namespace {
-
-// An independent decoder: a letter's value is its place in the alphabet of RFC 4648.
-std::vector<unsigned char> from_base64(const std::string& text) {
-  const std::string letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::vector<unsigned char> bytes;
-  unsigned bits = 0, count = 0;
-  for (const char c : text) {
-    const auto value = letters.find(c);
-    if (value == std::string::npos) break;
-    bits = (bits << 6) | static_cast<unsigned>(value);
-    count += 6;
-    if (count >= 8) {
-      count -= 8;
-      bytes.push_back(static_cast<unsigned char>((bits >> count) & 255));
-    }
-  }
-  return bytes;
-}
 
 class Report : public TemporaryFolder {
  protected:
@@ -59,7 +45,7 @@ class Report : public TemporaryFolder {
 };
 
 TEST_F(Report, IsOneFileWhosePicturesDecodeAndWhoseNumbersAreNumbers) {
-  const std::string html = page();
+  const std::string html = without_viewer(page());
   EXPECT_EQ(html.find("http"), std::string::npos);
   EXPECT_EQ(html.find("{{"), std::string::npos);
   EXPECT_NE(html.find("Title &amp; &lt;more&gt;"), std::string::npos);
@@ -77,6 +63,47 @@ TEST_F(Report, IsOneFileWhosePicturesDecodeAndWhoseNumbersAreNumbers) {
   for (const char* bad : {">nan<", ">-nan<", "Mnan", "Lnan", "inf mm"})
     EXPECT_EQ(html.find(bad), std::string::npos) << bad;
   EXPECT_GE(pictures, 5 * 5 + 6);  // five labels of five frames, six views of map and wall
+}
+
+// The page as it is made from a source tree whose viewer was built, or was not.
+class ReportWithTree : public Report {
+ protected:
+  void SetUp() override {
+    Report::SetUp();
+    tree_ = folder_ / "tree";
+    std::filesystem::create_directories(tree_ / "viewer" / "dist");
+    std::filesystem::copy_file(preset_root() / "viewer" / "report.html",
+                               tree_ / "viewer" / "report.html");
+    std::filesystem::create_directory_symlink(preset_root() / "studies", tree_ / "studies");
+    if (const char* home = std::getenv("RUGAE_HOME")) home_before_ = home;
+    setenv("RUGAE_HOME", tree_.c_str(), 1);
+  }
+  void TearDown() override {
+    if (home_before_.empty())
+      unsetenv("RUGAE_HOME");
+    else
+      setenv("RUGAE_HOME", home_before_.c_str(), 1);
+    Report::TearDown();
+  }
+  std::filesystem::path tree_;
+  std::string home_before_;
+};
+
+TEST_F(ReportWithTree, SaysThatItsViewerWasNotBuilt) {
+  const std::string html = page();
+  EXPECT_NE(html.find("This page has no interactive views"), std::string::npos);
+  EXPECT_EQ(html.find("class=\"view-data\""), std::string::npos);
+  EXPECT_EQ(html.find("class=\"viewer\""), std::string::npos);
+  EXPECT_NE(html.find("Inside the stomach"), std::string::npos);
+}
+
+TEST_F(ReportWithTree, HoldsItsViewerAndTheDataOfItsViews) {
+  write_atomic(tree_ / "viewer" / "dist" / "viewer.js", "let drawn = 1 && {{2}};");
+  const std::string html = page();
+  EXPECT_NE(html.find("<script class=\"viewer\">let drawn = 1 && {{2}};</script>"),
+            std::string::npos);
+  EXPECT_NE(html.find("<script type=\"application/json\" class=\"view-data\">"), std::string::npos);
+  EXPECT_EQ(html.find("This page has no interactive views"), std::string::npos);
 }
 
 TEST(Html, EscapesAndRounds) {
