@@ -11,7 +11,6 @@
 #include "core/presets.h"
 #include "dataset/image_io.h"
 #include "dataset/writer.h"
-#include "studies/cell_files.h"
 #include "studies/frame_pictures.h"
 #include "studies/html.h"
 #include "studies/map_over_truth.h"
@@ -172,7 +171,9 @@ std::string cell_chapters(const CellView& view, ReportViews* views) {
 bool has_loop(const StudyPart& part) { return part.options.measure == Measure::loop; }
 
 // A cell whose process was killed while it simulated has nothing to show.
-bool has_frames(const CellResult& cell) { return dataset_finished(cell.dataset); }
+bool has_frames(const CellResult& cell) {
+  return !cell.metrics.contains("failed") || cell.metrics.contains("simulation");
+}
 
 std::vector<CellResult> loop_cells(const std::vector<StudyPart>& parts) {
   std::vector<CellResult> cells;
