@@ -3,7 +3,7 @@
 import {element} from "./dom.js";
 
 const kDashes = new Set(["", "-", "\u2013", "\u2014"]);
-const kNumber = /^[\u00d7x<>]?\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(?![\d.]|\w+-)/i;
+const kNumber = /^[\u00d7x<>]?\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(?![\w.]*-|[\d.])/i;
 const collator = new Intl.Collator("en", {numeric: true, sensitivity: "base"});
 
 /** The number a cell's text begins with ("12.3 %", "+4", "\u22121.5", "\u00d7 0.5"); null where it does not. */
