@@ -16,18 +16,21 @@
 namespace rugae {
 namespace {
 
-constexpr int kPictures = 6;          // of each stage
-constexpr int kDepthMapsAtOnce = 16;  // between two steps of the progress line
+constexpr int kPictures = 6;         // of each stage
+constexpr std::size_t kAtOnce = 16;  // depth maps between two steps of the progress line
 
 std::vector<std::optional<MosaicDepth>> place_all(const std::vector<Mosaic>& mosaics,
                                                   const Structure& structure, const Lens& lens,
                                                   const ReconOptions& options, const Stages& stages,
                                                   Progress& progress) {
   progress.begin("shape from shading", mosaics.size());
-  std::vector<std::optional<MosaicDepth>> depths;
-  for (const Mosaic& mosaic : mosaics) {
-    depths.push_back(stages.depth(mosaic, structure, lens, options));
-    progress.step();
+  std::vector<std::optional<MosaicDepth>> depths(mosaics.size());
+  for (std::size_t begin = 0; begin < mosaics.size(); begin += kAtOnce) {
+    const std::size_t end = std::min(mosaics.size(), begin + kAtOnce);
+    tbb::parallel_for(begin, end, [&](std::size_t i) {
+      depths[i] = stages.depth(mosaics[i], structure, lens, options);
+    });
+    progress.step(end - begin);
   }
   const auto placed = std::ranges::count_if(depths, [](const auto& d) { return d.has_value(); });
   progress.end(fmt::format("{} of {} mosaics placed", placed, mosaics.size()));
@@ -42,8 +45,8 @@ void write_depth(const EstimateLayout& layout, const TriangleMesh& map, const St
     if (structure.placed[k]) placed.push_back(static_cast<int>(k));
   progress.begin("depth of key frames", placed.size());
   const std::vector<Vec3> rays = pixel_rays(original_lens);
-  for (std::size_t begin = 0; begin < placed.size(); begin += kDepthMapsAtOnce) {
-    const std::size_t end = std::min(placed.size(), begin + kDepthMapsAtOnce);
+  for (std::size_t begin = 0; begin < placed.size(); begin += kAtOnce) {
+    const std::size_t end = std::min(placed.size(), begin + kAtOnce);
     tbb::parallel_for(begin, end, [&](std::size_t i) {
       const int k = placed[i];
       write_exr(layout.depth(structure.frames[k]),
