@@ -31,7 +31,7 @@ std::string with_interval(const Repeats& r) {
 std::string entry_html(const TableEntry& entry) {
   std::string text = with_interval(entry.ours);
   if (entry.published)
-    text += fmt::format("<br><small>{} there, {} &times;</small>", html::number(*entry.published),
+    text += fmt::format("<br><small>published {}, ratio {}</small>", html::number(*entry.published),
                         html::number(entry.ours.mean / *entry.published, 2));
   if (entry.failed > 0) text += fmt::format("<br><small>{} failed</small>", entry.failed);
   return text;
@@ -50,7 +50,7 @@ std::string table_html(const SummaryTable& table) {
   }
   std::string note = "<code>" + html::escape(table.spec.metric) + "</code>";
   if (!table.spec.published.empty())
-    note += "; there: " + html::escape(published_source(table.spec.published));
+    note += "; published: " + html::escape(published_source(table.spec.published));
   return "<h4>" + html::escape(title_of(table.spec.title, table.spec.unit)) +
          "</h4><p class=\"intro\">" + note + "</p>\n" + out.str();
 }
