@@ -176,7 +176,7 @@ TEST_F(SceneFiles, WrongLikesAreNamedByLineAndColumn) {
   EXPECT_EQ(error_of(write("d.yaml", std::string("like: stomch\n"))),
             path("d.yaml") +
                 ":1:7: like: scene 'stomch': no such preset; did you mean 'stomach'?; known: "
-                "stomach, stomach-lesions, stomach-moving, stomach-unclean");
+                "chessboard, stomach, stomach-lesions, stomach-moving, stomach-unclean");
   EXPECT_EQ(error_of(write("e.yaml", std::string("like: none.yaml\n"))),
             path("e.yaml") + ":1:7: like: scene '" + path("none.yaml") + "': no such file");
   // what is wrong in the other file is told of the other file
