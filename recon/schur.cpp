@@ -1,12 +1,12 @@
 #include "recon/schur.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "recon/schur_blocks.h"
 
 namespace rugae {
 namespace {
@@ -17,7 +17,6 @@ constexpr double kMinDiagonal = 1e-6, kMaxDiagonal = 1e32;  // of what the dampi
 constexpr double kMinQuality = 1e-3;           // of the gain that the quadratic model promises
 constexpr double kParameterTolerance = 1e-14;  // relative step: nothing moves any more
 constexpr int kMaxRefusals = 10;               // steps in a row that lead behind a camera
-constexpr std::size_t kPointsPerPart = 512, kMostParts = 8;
 
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
@@ -48,21 +47,8 @@ Loss huber(double s, double width) {
   return {2.0 * width * root - width * width, width / root};
 }
 
-// Work is cut into parts by the number of points alone, and their sums are added in order: the same
-// result for any number of threads.
-struct Parts {
-  std::size_t points, count;
-  explicit Parts(std::size_t n)
-      : points(n), count(std::clamp<std::size_t>(n / kPointsPerPart, 1, kMostParts)) {}
-  std::size_t begin(std::size_t part) const { return points * part / count; }
-  template <typename Work>
-  void each(Work work) const {
-    tbb::parallel_for(std::size_t{0}, count, work);
-  }
-};
-
 double cost_of(const SchurProblem& problem, const std::vector<Camera>& cameras,
-               const std::vector<Vec3>& positions, const Parts& parts) {
+               const std::vector<Vec3>& positions, const PointParts& parts) {
   std::vector<double> sums(parts.count, 0.0);
   parts.each([&](std::size_t part) {
     double sum = 0.0;
@@ -84,39 +70,6 @@ double cost_of(const SchurProblem& problem, const std::vector<Camera>& cameras,
   for (const double sum : sums) cost += 0.5 * sum;
   return cost;
 }
-
-// The upper triangle of a symmetric matrix of 6 x 6 blocks, only those that a point links.
-class BlockPattern {
- public:
-  /// `slot_of` numbers the free cameras, -1 for those held.
-  BlockPattern(const SchurProblem& problem, const std::vector<int>& slot_of, int free)
-      : free_(free), place_(static_cast<std::size_t>(free) * free, -1) {
-    std::vector<char> linked(place_.size(), 0);
-    for (int c = 0; c < free; ++c) linked[at(c, c)] = 1;
-    for (const SchurProblem::Point& point : problem.points)
-      for (std::size_t i = 0; i < point.observations.size(); ++i)
-        for (std::size_t j = i; j < point.observations.size(); ++j) {
-          const int a = slot_of[point.observations[i].camera];
-          const int b = slot_of[point.observations[j].camera];
-          if (a >= 0 && b >= 0) linked[at(a, b)] = 1;
-        }
-    for (int a = 0; a < free; ++a)
-      for (int b = a; b < free; ++b)
-        if (linked[at(a, b)]) {
-          place_[at(a, b)] = static_cast<int>(blocks_.size());
-          blocks_.emplace_back(a, b);
-        }
-  }
-  int free() const { return free_; }
-  int place(int a, int b) const { return place_[at(a, b)]; }
-  const std::vector<std::pair<int, int>>& blocks() const { return blocks_; }
-
- private:
-  std::size_t at(int a, int b) const { return static_cast<std::size_t>(a) * free_ + b; }
-  int free_;
-  std::vector<int> place_;
-  std::vector<std::pair<int, int>> blocks_;
-};
 
 // What the cameras' equations are summed from, in one part of the points.
 struct CameraSums {
@@ -195,7 +148,7 @@ class Solver {
   bool nothing_moves(const Eigen::VectorXd& camera_step, const std::vector<Vec3>& point_step) const;
 
   SchurProblem& problem_;
-  Parts parts_;
+  PointParts parts_;
   std::vector<int> slot_of_;
   BlockPattern pattern_;
   std::vector<int> camera_of_;
