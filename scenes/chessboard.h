@@ -16,7 +16,7 @@ struct MucosaSample;
 struct ChessboardOptions {
   int columns = 9, rows = 7;  // inner corners, where four squares meet
   double square_mm = 2.5;
-  double border_mm = 2.5;            // of white around the squares
+  double border_mm = 1.25;           // of white around the squares
   double white = 0.8, black = 0.04;  // albedo of paper and of toner
   double gloss = 0.0;                // 0 to 1: share of the sheet under a glossy coat
   /// Throws Error naming `where` and the field that is out of range.

@@ -63,30 +63,29 @@ class Views {
   Draft drawn(int index, int attempt) const {
     constexpr double kGolden = 0.6180339887498949, kPlastic = 0.7548776662466927;
     const auto start = random_uniform(seed_, Purpose::trajectory, kChannelBoardStart, 0);
-    const auto u = random_uniform(
-        seed_, Purpose::trajectory, kChannelBoardView,
-        static_cast<std::uint64_t>(index) * kMostAttempts + static_cast<std::uint64_t>(attempt));
+    // The same tilt at every attempt: drawn anew, those that fit would be the small ones.
+    const auto u = random_uniform(seed_, Purpose::trajectory, kChannelBoardView,
+                                  static_cast<std::uint64_t>(index));
     Draft draft;
-    const double size = fraction_of(start[0] + kPlastic * index);
-    draft.fill = options_.least_fill + size * (options_.most_fill - options_.least_fill);
-    for (int k = 0; k < attempt; ++k) draft.fill *= kShrink;
+    double size = fraction_of(start[0] + kPlastic * index);
+    double most_tilt_rad = options_.most_tilt_rad, most_roll_rad = rad_from_deg(50.0);
     const SineCosine around = portable_turn(start[1] + kGolden * index);
     const Vec2 direction(around.cosine, around.sine);
     const Vec2 border = direction / direction.cwiseAbs().maxCoeff();
-    const double kind = fraction_of(start[2] + kGolden * kPlastic * index);
-    const double into_corners =
-        0.5 * (1.0 + options_.central_share);  // half of those to the border
-    double most_roll_rad = rad_from_deg(50.0);
-    if (kind < options_.central_share) {
-      draft.target = 0.25 * u[3] * border;
-    } else if (kind < into_corners) {
-      draft.target = {index & 1 ? 1.0 : -1.0, index & 2 ? 1.0 : -1.0};
-      most_roll_rad = rad_from_deg(12.0);  // only an upright board fits into a corner
+    const int turn = (index + static_cast<int>(8.0 * start[2])) % 8;  // of eight views
+    if (turn % 2 == 1) {
+      // Only a board that is upright, small and not tilted much fits into a corner.
+      draft.target = {turn & 2 ? 1.0 : -1.0, turn & 4 ? 1.0 : -1.0};
+      size *= 0.2;
+      most_tilt_rad *= 0.35;
+      most_roll_rad = rad_from_deg(4.0);
     } else {
-      draft.target = border;
+      draft.target = turn % 4 == 2 ? border : Vec2(0.25 * u[3] * border);
     }
+    draft.fill = options_.least_fill + size * (options_.most_fill - options_.least_fill);
+    for (int k = 0; k < attempt; ++k) draft.fill *= kShrink;
     // Small tilts tell little, so few of them are wanted: the square root favours large ones.
-    const double tilt_rad = options_.most_tilt_rad * std::sqrt(u[0]);
+    const double tilt_rad = most_tilt_rad * std::sqrt(u[0]);
     const SineCosine axis = portable_turn(u[1]);
     const double roll_rad = (2.0 * u[2] - 1.0) * most_roll_rad;
     draft.turned =

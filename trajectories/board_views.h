@@ -12,14 +12,13 @@ namespace rugae {
 /// How the views are drawn. Each differs from the others in distance, in the direction and the
 /// amount of its tilt, in its turn around the line of sight, and in the part of the picture that it
 /// covers (Zhang 2000, doi:10.1109/34.888718: tilts of about 45 degrees determine the focal length
-/// best; distortion shows at the picture's borders and corners).
+/// best; distortion shows at the picture's borders and corners). Of eight views four reach into the
+/// corners of the picture, two to anywhere on its borders, and two are around its middle.
 struct BoardViewOptions {
   int count = 0;                 // 0: the trajectory is none around a board
   double least_fill = 0.35;      // share of the picture's width or height that the board takes up,
   double most_fill = 0.9;        // whichever is more, where it stands upright in the middle
   double most_tilt_rad = 0.785;  // from facing the camera
-  double central_share = 0.25;   // of the views around the middle; half of the others reach into
-                                 // the corners of the picture, half to anywhere on its borders
   double margin_share = 0.01;    // of the picture's width, kept free around the board
   double most_incidence_rad = 1.2;  // of the line of sight anywhere on the board
 };

@@ -42,7 +42,6 @@ void check_ranges(const TrajectoryOptions& o, const PlaceOf& place_of) {
   in_range("board.least_fill", o.board.least_fill, 0.05, 0.95);
   in_range("board.most_fill", o.board.most_fill, 0.05, 0.95);
   in_range("board.most_tilt_deg", deg_from_rad(o.board.most_tilt_rad), 0.0, 60.0);
-  in_range("board.central_share", o.board.central_share, 0.0, 1.0);
   check(o.board.least_fill <= o.board.most_fill,
         "{}: board.least_fill is {}, expected at most board.most_fill, which is {}",
         place_of("board.least_fill"), o.board.least_fill, o.board.most_fill);
@@ -91,7 +90,6 @@ void read(YamlReader& yaml, TrajectoryOptions& options) {
     board->get("least_fill", options.board.least_fill);
     board->get("most_fill", options.board.most_fill);
     board->get_deg("most_tilt_deg", options.board.most_tilt_rad);
-    board->get("central_share", options.board.central_share);
     board->finish();
   }
 }

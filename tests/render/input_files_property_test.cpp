@@ -115,7 +115,6 @@ const std::vector<Field> kTrajectory = {
     {"board.least_fill", Kind::real, 0.05, 0.35, {}},  // below any largest one
     {"board.most_fill", Kind::real, 0.35, 0.95, {}},
     {"board.most_tilt_deg", Kind::real, 0.0, 60.0, {}},
-    {"board.central_share", Kind::real, 0.0, 1.0, {}},
 };
 
 TEST_F(InputFiles, SoundTrajectoriesAreRead) {

@@ -35,7 +35,7 @@ class Calibration : public TemporaryFolder {
                              kColumns, kRows, kSquare_mm));
     run_.camera = (folder_ / "small.yaml").string();
     run_.scene = (folder_ / "board.yaml").string();
-    run_.views = 12;
+    run_.views = 20;
     run_.render.lens.samples = 4;
   }
 
@@ -162,7 +162,7 @@ TEST_F(Calibration, TheLensComesBack) {
     const auto& m = made.metrics.at("calibration");
     SCOPED_TRACE(m.dump());
     EXPECT_FALSE(made.kept);
-    EXPECT_EQ(m.at("used_views"), 12);
+    EXPECT_EQ(m.at("used_views"), 20);
     EXPECT_LE(m.at("rms_px").get<double>(), 0.06);
     EXPECT_LE(std::abs(m.at("focal_error_share").get<double>()), 1e-3);
     EXPECT_LE(m.at("principal_point_error_px").get<double>(), 0.15);
