@@ -176,7 +176,10 @@ test("a cell that failed still shows the truth", () => visit(async (page) => {
   assert.equal(await view.getByRole("button", {name: "Map", exact: true}).count(), 0);
   const host = view.locator(".view-host"), before = await middleOf(page, host);
   await view.getByRole("button", {name: "Wall", exact: true}).click();
-  assert.ok(shareDifferent(before, await middleOf(page, host)) > 0.1);
+  const bare = await middleOf(page, host);
+  assert.ok(shareDifferent(before, bare) > 0.1, "no wall");
+  await view.getByRole("button", {name: "Paths", exact: true}).click();
+  assert.ok(shareDifferent(bare, await middleOf(page, host)) > 0.0003, "no true path");
   assert.match(await view.locator(".view-facts span").innerText(), /no estimate/);
 }));
 
