@@ -22,11 +22,12 @@ namespace {
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
-// Of the whole page; a triangle takes about 13 bytes of it, a frame with its labels 40 thousand.
+// Of the whole page; a triangle takes about 13 bytes of it, a frame with its labels 25 to 40
+// thousand.
 constexpr std::size_t kTriangles = 500'000, kStops = 500;
 constexpr std::size_t kMostTriangles = 60'000, kFewestTriangles = 5'000;
 constexpr std::size_t kMostStops = 90, kFewestStops = 8;
-constexpr int kFrameWidth_px = 400, kLabelWidth_px = 200, kQuality = 80;
+constexpr int kQuality = 80;
 
 std::string hash_of(const TriangleMesh& mesh) {
   std::string bytes(reinterpret_cast<const char*>(mesh.vertices.data()),
@@ -101,10 +102,11 @@ std::vector<double> seen_vertices(const Visibility& visibility, const TriangleMe
 }
 
 Json pictures_json(const CellView& view, const FramePictures& pictures, int frame) {
-  Json uris = {{"frame", html::jpeg(pictures.observation(frame), kFrameWidth_px, kQuality)}};
+  const int frame_width_px = view.many_cells ? 320 : 400, label_width_px = frame_width_px / 2;
+  Json uris = {{"frame", html::jpeg(pictures.observation(frame), frame_width_px, kQuality)}};
   for (const LabelImage& label : label_images())
     if (has_label(view, label.name, frame))
-      uris[label.name] = html::jpeg(pictures.label(label.name, frame), kLabelWidth_px, kQuality);
+      uris[label.name] = html::jpeg(pictures.label(label.name, frame), label_width_px, kQuality);
   return uris;
 }
 
@@ -148,8 +150,10 @@ Json labels_json(const CellView& view, const FramePictures& pictures) {
 }  // namespace
 
 ReportViews::ReportViews(std::size_t cells)
-    : triangles_(std::clamp(kTriangles / std::max<std::size_t>(cells, 1), kFewestTriangles, kMostTriangles)),
-      stops_(static_cast<int>(std::clamp(kStops / std::max<std::size_t>(cells, 1), kFewestStops, kMostStops))) {}
+    : triangles_(std::clamp(kTriangles / std::max<std::size_t>(cells, 1), kFewestTriangles,
+                            kMostTriangles)),
+      stops_(static_cast<int>(
+          std::clamp(kStops / std::max<std::size_t>(cells, 1), kFewestStops, kMostStops))) {}
 
 std::string ReportViews::part(const CellView& view, const MapOverTruth& over,
                               const FramePictures& pictures) {

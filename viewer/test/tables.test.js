@@ -16,6 +16,7 @@ test("a text begins with a number, or does not", () => {
 test("numbers sort as numbers, with their units", () => {
   assert.deepEqual(sorted(["10", "9.5", "100 %", "-1"]), ["-1", "9.5", "10", "100 %"]);
   assert.deepEqual(sorted(["10", "9.5", "100 %", "-1"], true), ["100 %", "10", "9.5", "-1"]);
+  assert.deepEqual(sorted(["0.3", "0.25", "-1", "-2"]), ["-2", "-1", "0.25", "0.3"]);
 });
 
 test("dashes come last in both directions, in their old order", () => {
