@@ -26,8 +26,8 @@ struct SceneFile {
 
 /// With `like: NAME_OR_FILE` what the file does not say is as in that preset or file (core/like.h).
 ///
-/// A number of `relief`, `mucosa`, `board`, `lesions` or `objects`, `scale` and `variation` may be a
-/// distribution in place of a value:
+/// A number of `relief`, `mucosa`, `board`, `lesions` or `objects`, `scale` and `variation` may be
+/// a distribution in place of a value:
 ///   {uniform: [least, most]}, {normal: [mean, deviation]} (cut off at two deviations),
 ///   {choice: [value, ...]} (all alike).
 /// It is drawn by (seed, the key's path), so that no draw depends on what else the file holds.

@@ -61,7 +61,8 @@ TEST_F(TrajectoryFile, WrongContents) {
       "is 1)");
   EXPECT_EQ(load_error("like: mine.yaml\n"), ":1:7: like goes in a circle");
   EXPECT_EQ(load_error("like: seven\n"),
-            ":1:7: like: trajectory 'seven': no such preset; known: 1, 2, 3, 4, 5, 6, chessboard, inspection");
+            ":1:7: like: trajectory 'seven': no such preset; known: 1, 2, 3, 4, 5, 6, chessboard, "
+            "inspection");
 }
 
 TEST_F(TrajectoryFile, LikeTakesWhatIsNotGiven) {
