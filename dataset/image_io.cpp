@@ -5,12 +5,15 @@
 #include <cstdint>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <string_view>
 #include <vector>
 
 #include "core/check.h"
 #include "core/files.h"
 #include "dataset/image_whole.h"
+#include "dataset/png_chunks.h"
+#include "dataset/png_decode.h"
 #include "dataset/png_encode.h"
 
 namespace rugae {
@@ -26,9 +29,20 @@ std::string lower_extension(const fs::path& file) {
 
 bool is_jpeg(const std::string& extension) { return extension == ".jpg" || extension == ".jpeg"; }
 
+// The PNGs that the flags leave as they are; nothing for others.
+std::optional<cv::Mat> decoded_png(const std::string& name, std::string_view bytes, int flags) {
+  if (!bytes.starts_with(kPngSignature)) return std::nullopt;
+  const auto chunks = png_chunks(name, bytes);
+  std::optional<cv::Mat> image = chunks ? decode_png(*chunks) : std::nullopt;
+  const bool as_stored = flags == cv::IMREAD_UNCHANGED;
+  if (image && !as_stored && image->type() != CV_8UC3) return std::nullopt;
+  return image;
+}
+
 cv::Mat decode(const fs::path& file, int flags) {
   const std::string bytes = read_text(file);
   check_image_is_whole(file.string(), bytes);
+  if (std::optional<cv::Mat> image = decoded_png(file.string(), bytes, flags)) return *image;
   cv::Mat image;
   try {
     image = cv::imdecode(

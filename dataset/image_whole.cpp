@@ -1,16 +1,14 @@
 #include "dataset/image_whole.h"
 
-#include <libdeflate.h>
-
 #include <cstdint>
 
 #include "core/check.h"
+#include "dataset/png_chunks.h"
 
 namespace rugae {
 namespace {
 
 using namespace std::string_view_literals;
-constexpr std::string_view kPngSignature = "\x89PNG\r\n\x1a\n"sv;
 constexpr std::string_view kJpegStart = "\xff\xd8\xff"sv;
 constexpr std::string_view kJpegScan = "\xff\xda"sv;
 constexpr std::string_view kJpegEnd = "\xff\xd9"sv;
@@ -18,31 +16,9 @@ constexpr std::string_view kJpegEnd = "\xff\xd9"sv;
 std::uint32_t byte_at(std::string_view bytes, std::size_t at) {
   return static_cast<unsigned char>(bytes[at]);
 }
-std::uint32_t big_endian(std::string_view bytes, std::size_t at) {
-  return byte_at(bytes, at) << 24 | byte_at(bytes, at + 1) << 16 | byte_at(bytes, at + 2) << 8 |
-         byte_at(bytes, at + 3);
-}
 std::uint32_t little_endian(std::string_view bytes, std::size_t at) {
   return byte_at(bytes, at) | byte_at(bytes, at + 1) << 8 | byte_at(bytes, at + 2) << 16 |
          byte_at(bytes, at + 3) << 24;
-}
-
-// A PNG is a signature and chunks of length, type, data, CRC-32 of type and data; the last is IEND
-// (ISO/IEC 15948, section 5).
-bool png_is_whole(const std::string& name, std::string_view bytes) {
-  constexpr std::size_t kFrame = 12;  // length, type and checksum of a chunk
-  std::size_t at = kPngSignature.size();
-  while (at + kFrame <= bytes.size()) {
-    const std::size_t length = big_endian(bytes, at);
-    if (length > bytes.size() - at - kFrame) return false;
-    const std::string_view type = bytes.substr(at + 4, 4);
-    const auto crc = libdeflate_crc32(0, bytes.data() + at + 4, length + 4);
-    check(crc == big_endian(bytes, at + 8 + length),
-          "{}: damaged: the checksum of its {} chunk at byte {} does not match", name, type, at);
-    if (type == "IEND") return true;
-    at += kFrame + length;
-  }
-  return false;
 }
 
 // A byte 0xff within a scan's data is always followed by 0 or a restart marker, so an end marker
@@ -72,7 +48,7 @@ bool bmp_is_whole(std::string_view bytes) {
 void check_image_is_whole(const std::string& name, std::string_view bytes) {
   bool whole = false;
   if (bytes.starts_with(kPngSignature))
-    whole = png_is_whole(name, bytes);
+    whole = png_chunks(name, bytes).has_value();
   else if (bytes.starts_with(kJpegStart))
     whole = jpeg_is_whole(bytes);
   else if (bytes.starts_with("BM"))
