@@ -47,7 +47,15 @@ std::ifstream open_for_reading(const fs::path& file) {
 
 std::string read_text(const fs::path& file) {
   std::ifstream in = open_for_reading(file);
-  std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  // In blocks: the size of a pipe is not known before its end.
+  constexpr std::size_t kBlock = std::size_t{1} << 18;
+  std::string bytes;
+  while (in) {
+    const std::size_t known = bytes.size();
+    bytes.resize(known + kBlock);
+    in.read(bytes.data() + known, kBlock);
+    bytes.resize(known + static_cast<std::size_t>(in.gcount()));
+  }
   check(!in.bad(), "{}: reading failed: {}", file.string(), std::strerror(errno));
   return bytes;
 }
