@@ -230,16 +230,20 @@ void fit(const AlignImage& reference, const AlignImage& moving, const std::vecto
 
 }  // namespace
 
-AlignImage prepare_alignment(const Frame& frame, const AlignOptions& options) {
+AlignField prepare_field(const cv::Mat& valid, const AlignOptions& options) {
+  const double radius_px = options.patch_radius_px * valid.cols / kReferenceWidthPx;
+  return {patch_inside(valid, radius_px), shrunk(valid) == 255};
+}
+
+AlignImage prepare_alignment(const Frame& frame, const AlignField& field) {
   AlignImage image;
   image.index = frame.index;
   image.gray = frame.gray;
   frame.gray.convertTo(image.intensity, CV_32F, 1.0 / 255.0);
   cv::GaussianBlur(image.intensity, image.smooth, {}, kSmoothingPx);
-  const double radius_px = options.patch_radius_px * frame.gray.cols / kReferenceWidthPx;
-  image.landing = patch_inside(frame.valid, radius_px);
-  image.usable = usable_pixels(frame) & image.landing;
-  image.flow = prepare_flow(shrunk(frame.gray), shrunk(frame.valid) == 255);
+  image.landing = field.landing;
+  image.usable = usable_pixels(frame) & field.landing;
+  image.flow = prepare_flow(shrunk(frame.gray), field.flow_valid);
   return image;
 }
 
@@ -296,8 +300,9 @@ std::optional<PairAlignment> align(const AlignImage& reference, const AlignImage
 std::optional<PairAlignment> align(const Frame& reference, const Frame& moving,
                                    const AlignOptions& options, std::uint64_t seed,
                                    const AlignGuess& guess) {
-  return align(prepare_alignment(reference, options), prepare_alignment(moving, options), options,
-               seed, guess);
+  return align(prepare_alignment(reference, prepare_field(reference.valid, options)),
+               prepare_alignment(moving, prepare_field(moving.valid, options)), options, seed,
+               guess);
 }
 
 }  // namespace rugae

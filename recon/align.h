@@ -40,7 +40,15 @@ struct AlignImage {
   FlowImage flow;             // shrunk
 };
 
-AlignImage prepare_alignment(const Frame& frame, const AlignOptions& options);
+/// What is the same for all frames of a sequence, computed once; `valid` is Frame::valid.
+struct AlignField {
+  cv::Mat landing;     // CV_8U
+  cv::Mat flow_valid;  // CV_8U, shrunk
+};
+
+AlignField prepare_field(const cv::Mat& valid, const AlignOptions& options);
+
+AlignImage prepare_alignment(const Frame& frame, const AlignField& field);
 
 /// The flow of a pair, there and back, at the size of AlignImage::flow.
 struct PairFlow {

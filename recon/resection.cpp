@@ -167,14 +167,14 @@ std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
   const std::vector<std::vector<Seen>> seen = points_seen(structure);
   using Shared = std::shared_ptr<const AlignImage>;
   Cache<Shared> references(kReferencesHeld);
+  const AlignField field = prepare_field(frames.valid(), align_options);
   const auto reference_at = [&](int frame) {
-    return std::make_shared<const AlignImage>(
-        prepare_alignment(frames.pose_frame(frame), align_options));
+    return std::make_shared<const AlignImage>(prepare_alignment(frames.pose_frame(frame), field));
   };
   // No point starts in the frame to be placed: its reflections need not be known.
   const cv::Mat none = cv::Mat::zeros(frames.valid().size(), CV_8U);
   const auto moving_at = [&](int frame) {
-    return prepare_alignment({frame, frames.gray(frame), {}, none, frames.valid()}, align_options);
+    return prepare_alignment({frame, frames.gray(frame), {}, none, frames.valid()}, field);
   };
   for (std::size_t begin = 0; begin < rest.size(); begin += kFramesAtOnce) {
     const std::size_t end = std::min(rest.size(), begin + kFramesAtOnce);

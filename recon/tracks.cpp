@@ -177,10 +177,11 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
   Followed followed;
   std::vector<int>& at = followed.keyframes;
   at = keyframes.frames;
+  const AlignField field = prepare_field(frames.valid(), align_options);
   std::map<int, Prepared> prepared;  // from the reference on
   const auto prepare = [&](int index) -> Prepared {
     const Frame frame = frames.pose_frame(index);
-    return {prepare_alignment(frame, align_options), corners(frame, spacing_px)};
+    return {prepare_alignment(frame, field), corners(frame, spacing_px)};
   };
   const auto load = [&](int index) -> const Prepared& {
     const auto [place, fresh] = prepared.try_emplace(index);

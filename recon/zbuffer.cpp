@@ -44,10 +44,11 @@ class Facet {
     if (determinant == 0.0) return -1.0;
     // Neighbours share edges exactly; a rounding error must not open a slit between them.
     constexpr double kEdge = 1e-9;
-    const double inverse = 1.0 / determinant;
-    const double u = ray.dot(u_) * inverse, v = ray.dot(v_) * inverse;
-    if (!(u >= -kEdge && v >= -kEdge && u + v <= 1.0 + kEdge)) return -1.0;
-    return distance_ * inverse;
+    // Most rays miss: they are told by products with the determinant, without a division.
+    const double size = std::abs(determinant), sign = determinant > 0.0 ? 1.0 : -1.0;
+    const double u = sign * ray.dot(u_), v = sign * ray.dot(v_), slack = kEdge * size;
+    if (!(u >= -slack && v >= -slack && u + v <= size + slack)) return -1.0;
+    return distance_ * (1.0 / determinant);
   }
 
  private:
@@ -137,16 +138,19 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world, co
     const int right = std::min(lens.width - 1.0, std::ceil(box.max().x() + margin));
     const int bottom = std::min(lens.height - 1.0, std::ceil(box.max().y() + margin));
     if (left > right || top > bottom) continue;
+    const bool everywhere = seen.half_angle_rad == kPi;
     const double seen_cosine = std::cos(seen.half_angle_rad) - kCosineRounding;
     const Facet facet(c[0]->p_cam, c[1]->p_cam - c[0]->p_cam, c[2]->p_cam - c[0]->p_cam);
-    for (int y = top; y <= bottom; ++y)
+    for (int y = top; y <= bottom; ++y) {
+      const Vec3* row = &rays[static_cast<std::size_t>(y) * lens.width];
+      auto* nearest = depth.ptr<float>(y);
       for (int x = left; x <= right; ++x) {
-        const Vec3& ray = rays[static_cast<std::size_t>(y) * lens.width + x];
-        if (!(ray.z() > 0.0) || ray.dot(seen.centre) < seen_cosine) continue;
+        const Vec3& ray = row[x];
+        if (!(ray.z() > 0.0) || (!everywhere && ray.dot(seen.centre) < seen_cosine)) continue;
         const double z = facet.hit(ray) * ray.z();
-        float& nearest = depth.at<float>(y, x);
-        if (z > 0.0 && !(nearest <= z)) nearest = static_cast<float>(z);
+        if (z > 0.0 && !(nearest[x] <= z)) nearest[x] = static_cast<float>(z);
       }
+    }
   }
   return depth;
 }
