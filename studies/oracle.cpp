@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include "core/check.h"
 #include "core/sim3.h"
 #include "recon/growth.h"
 #include "recon/resection.h"
-#include "studies/wall_points.h"
+#include "studies/true_motion.h"
 
 namespace rugae {
 namespace {
@@ -37,29 +38,20 @@ class Grids {
 
 class Oracle {
  public:
-  Oracle(const std::filesystem::path& dataset, const Lens& lens) : wall_(dataset), lens_(lens) {}
+  Oracle(const std::filesystem::path& dataset, const Lens& lens) : motion_(dataset), lens_(lens) {}
 
   Followed true_tracks(const FrameSource& frames, Followed followed) const {
     const Grids grids(lens_, frames.lens());
     std::vector<Track>& tracks = followed.tracks;
-    const int n = static_cast<int>(followed.keyframes.size());
     // The wall point of a track is what its first observation sees.
-    std::vector<WallPoint> points(tracks.size());
-    for (int k = 0; k < n; ++k) {
-      std::vector<std::size_t> begun;
-      std::vector<Vec2> pixels;
-      for (std::size_t t = 0; t < tracks.size(); ++t) {
-        const Track::Observation& first = tracks[t].observations.front();
-        if (first.keyframe != k) continue;
-        const auto pixel = grids.observed(first.pixel);
-        if (!pixel) continue;
-        begun.push_back(t);
-        pixels.push_back(*pixel);
-      }
-      const auto seen = wall_.seen(followed.keyframes[k], pixels);
-      for (std::size_t i = 0; i < begun.size(); ++i) points[begun[i]] = seen[i];
-    }
-    for (int k = 0; k < n; ++k) move_observations(k, followed.keyframes[k], grids, points, tracks);
+    std::map<std::pair<int, int>, std::vector<Track*>> seen_in;  // by first and other key frame
+    for (Track& track : tracks)
+      for (const Track::Observation& o : track.observations)
+        seen_in[{track.observations.front().keyframe, o.keyframe}].push_back(&track);
+    std::map<const Track*, Vec2> first;  // its pixel, which is moved as well
+    for (const Track& track : tracks) first[&track] = track.observations.front().pixel;
+    for (const auto& [keyframes, group] : seen_in)
+      move_observations(keyframes, followed.keyframes, grids, first, group);
     for (Track& track : tracks)
       std::erase_if(track.observations, [](const auto& o) { return !o.inlier; });
     std::erase_if(tracks, [](const Track& track) { return track.observations.size() < 2; });
@@ -133,7 +125,7 @@ class Oracle {
         rays.push_back(*ray / ray->z());
         places.push_back(&z);
       }
-    const std::vector<double> depths = wall_.depths_mm(structure.frames[mosaic.anchor], rays);
+    const std::vector<double> depths = motion_.depths_mm(structure.frames[mosaic.anchor], rays);
     for (std::size_t i = 0; i < places.size(); ++i)
       *places[i] = static_cast<float>(map_per_mm * depths[i]);
     return ours;
@@ -141,24 +133,29 @@ class Oracle {
 
  private:
   Rigid3 true_pose(int frame) const {  // world_from_camera, mm
-    return wall_.truth().track()[static_cast<std::size_t>(frame)].world_from_camera;
+    return motion_.truth().track()[static_cast<std::size_t>(frame)].world_from_camera;
   }
 
-  // Moves the observations of a key frame to where the wall points are seen; those that are hidden
-  // are marked.
-  void move_observations(int keyframe, int frame, const Grids& grids,
-                         const std::vector<WallPoint>& points, std::vector<Track>& tracks) const {
+  // Moves the observations of tracks in the second key frame to where the wall points that they
+  // began with in the first are seen; those that are hidden are marked.
+  void move_observations(const std::pair<int, int>& keyframes, const std::vector<int>& frames,
+                         const Grids& grids, const std::map<const Track*, Vec2>& first,
+                         const std::vector<Track*>& tracks) const {
     std::vector<Track::Observation*> observations;
-    std::vector<WallPoint> wanted;
-    for (std::size_t t = 0; t < tracks.size(); ++t)
-      for (Track::Observation& o : tracks[t].observations) {
-        if (o.keyframe != keyframe) continue;
-        observations.push_back(&o);
-        wanted.push_back(points[t]);
-      }
-    const auto pixels = wall_.pixels(frame, wanted);
+    std::vector<Vec2> begun;
+    for (Track* track : tracks) {
+      const auto o =
+          std::ranges::find(track->observations, keyframes.second, &Track::Observation::keyframe);
+      o->inlier = false;
+      const auto pixel = grids.observed(first.at(track));
+      if (!pixel) continue;
+      observations.push_back(&*o);
+      begun.push_back(*pixel);
+    }
+    const auto landings = motion_.follow(frames[keyframes.first], frames[keyframes.second], begun);
     for (std::size_t i = 0; i < observations.size(); ++i) {
-      const auto pixel = pixels[i] ? grids.preprocessed(*pixels[i]) : std::nullopt;
+      if (landings[i].sight != Sight::seen) continue;
+      const auto pixel = grids.preprocessed(landings[i].pixel);
       observations[i]->inlier = pixel.has_value();
       if (pixel) observations[i]->pixel = *pixel;
     }
@@ -178,12 +175,12 @@ class Oracle {
         points.push_back(track.point);
         there.push_back(*pixel);
       }
-    const auto wall = wall_.seen(structure.frames[keyframe], there);
-    const auto here = wall_.pixels(frame, wall);
+    const auto here = motion_.follow(structure.frames[keyframe], frame, there);
     std::vector<Vec3> seen;
     std::vector<Vec2> rays;
     for (std::size_t i = 0; i < here.size(); ++i) {
-      const auto pixel = here[i] ? grids.preprocessed(*here[i]) : std::nullopt;
+      const auto pixel =
+          here[i].sight == Sight::seen ? grids.preprocessed(here[i].pixel) : std::nullopt;
       const auto ray = pixel ? ray_of(frames.lens(), *pixel) : std::nullopt;
       if (!ray) continue;
       seen.push_back(points[i]);
@@ -208,7 +205,7 @@ class Oracle {
     return *found;
   }
 
-  WallPoints wall_;
+  TrueMotion motion_;
   Lens lens_;
 };
 

@@ -1,6 +1,7 @@
 #include "studies/true_motion.h"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <thread>
 
@@ -147,6 +148,22 @@ std::vector<TrueLanding> TrueMotion::follow(int from, int to, std::span<const Ve
   for (std::size_t i = 0; i < n; ++i)
     if (faces[i] && !hidden[i]) landings[i].sight = Sight::seen;
   return landings;
+}
+
+std::vector<double> TrueMotion::depths_mm(int frame, std::span<const Vec3> rays) const {
+  check(frame >= 0 && frame < truth_.size(), "true depth of frame {}: the dataset has {}", frame,
+        truth_.size());
+  const Rigid3 pose = truth_.track()[static_cast<std::size_t>(frame)].world_from_camera;
+  const std::vector<Eye> eyes(rays.size(), {pose.translation, 0.0});
+  std::vector<Vec3> directions;
+  for (const Vec3& ray : rays) directions.push_back((pose.rotation * ray).normalized());
+  std::vector<Hit> hits(rays.size());
+  wall(frame)->raycaster->intersect(eyes, directions, hits, RayOrder::scattered);
+  std::vector<double> depths;
+  for (std::size_t i = 0; i < rays.size(); ++i)
+    depths.push_back(hits[i].met() ? hits[i].range_mm / rays[i].norm()
+                                   : std::numeric_limits<double>::quiet_NaN());
+  return depths;
 }
 
 }  // namespace rugae

@@ -42,6 +42,9 @@ class TrueMotion {
   /// In the order of the pixels, which are those of frame `from` as observed (distorted). Throws
   /// Error for frames that do not exist and walls that cannot be read.
   std::vector<TrueLanding> follow(int from, int to, std::span<const Vec2> pixels) const;
+  /// z-depth, mm, of each ray (camera axes, z = 1) from the camera at the frame's time, to the wall
+  /// as it is then; NaN where nothing is met.
+  std::vector<double> depths_mm(int frame, std::span<const Vec3> rays) const;
 
  private:
   struct FrameWall;

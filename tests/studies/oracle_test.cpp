@@ -11,8 +11,8 @@
 #include "dataset/observations.h"
 #include "recon/pipeline.h"
 #include "render/simulate.h"
+#include "studies/true_motion.h"
 #include "studies/variant.h"
-#include "studies/wall_points.h"
 #include "tests/studies/temporary_folder.h"
 #include "validate/evaluate.h"
 
@@ -66,35 +66,19 @@ class WithOracle : public ::testing::Test {
 };
 fs::path WithOracle::folder_;
 
-// Seen in one frame, found in the other, and back: the same pixel; and its depth is the label's.
-TEST_F(WithOracle, WallPointsGoThereAndBack) {
-  const WallPoints wall(folder_ / "data");
+TEST_F(WithOracle, TrueDepthsAreThoseOfTheLabels) {
+  const TrueMotion motion(folder_ / "data");
   std::vector<Vec2> pixels;
   std::vector<Vec3> rays;
-  const Lens& lens = wall.truth().camera().lens;
+  const Lens& lens = motion.truth().camera().lens;
   for (double y = 10.5; y < lens.height; y += 12.0)
     for (double x = 10.5; x < lens.width; x += 12.0) {
       pixels.push_back({x, y});
       const Vec3 ray = *lens.unproject(pixels.back());
       rays.push_back(ray / ray.z());
     }
-  const auto points = wall.seen(3, pixels);
-  const auto there = wall.pixels(6, points);
-  constexpr double kThereAndBack_px = 1e-3;  // barycentric coordinates are single precision
-  int found = 0;
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (!there[i]) continue;
-    const auto again = wall.seen(6, std::vector<Vec2>{*there[i]});
-    const auto back = wall.pixels(3, again);
-    ASSERT_TRUE(back[0].has_value());
-    EXPECT_TRUE((*back[0] - pixels[i]).norm() <= kThereAndBack_px) << pixels[i].transpose();
-    ++found;
-  }
-  EXPECT_GT(found, static_cast<int>(pixels.size()) / 2);
-  EXPECT_LT(found, static_cast<int>(pixels.size()));  // some leave the picture or are hidden
-
-  const cv::Mat label = wall.truth().depth_mm(3);
-  const auto depths = wall.depths_mm(3, rays);
+  const cv::Mat label = motion.truth().depth_mm(3);
+  const auto depths = motion.depths_mm(3, rays);
   for (std::size_t i = 0; i < pixels.size(); ++i)
     EXPECT_NEAR(depths[i],
                 label.at<float>(static_cast<int>(pixels[i].y()), static_cast<int>(pixels[i].x())),
