@@ -1,6 +1,6 @@
 // The command line: arguments -> options -> one call a subcommand. Errors are one line on standard
-// error. Exit codes: 0 done, 1 a fault of ours, 2 bad usage or input, 3 a gate failed, 130 stopped
-// by Ctrl-C.
+// error. Exit codes: 0 done, 1 a fault of ours, 2 bad usage or input, 3 a gate or a cell failed,
+// 130 stopped by Ctrl-C.
 
 #include <glog/logging.h>
 #include <malloc.h>
@@ -41,9 +41,8 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.failure_message(CLI::FailureMessage::simple);
   app.footer(
-      "Exit codes: 0 done, 1 a fault of ours, 2 bad usage or input, 3 a gate failed, 130 stopped "
-      "by "
-      "Ctrl-C.");
+      "Exit codes: 0 done, 1 a fault of ours, 2 bad usage or input, 3 a gate or a cell failed, 130 "
+      "stopped by Ctrl-C.");
   int exit_code = 0;
   rugae::add_simulate(app);
   rugae::add_calibrate(app);

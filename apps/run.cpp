@@ -79,8 +79,8 @@ void add_run(CLI::App& app, int& exit_code) {
     const StudyResult result = run_study(study, a->out, a->options, progress);
     for (const std::string& gate : result.failed_gates)
       std::fprintf(stderr, "gate failed: %s\n", gate.c_str());
-    constexpr int kGateFailed = 3;
-    if (!result.failed_gates.empty()) exit_code = kGateFailed;
+    constexpr int kNotAsAsked = 3;
+    if (!result.failed_gates.empty() || result.failed_cells > 0) exit_code = kNotAsAsked;
     print(a->json,
           {{"cells", result.cells},
            {"failed_cells", result.failed_cells},

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kDone = 0, kBadInput = 2, kGateFailed = 3;
+constexpr int kDone = 0, kBadInput = 2, kNotAsAsked = 3;
 
 struct Outcome {
   int code = -1;
@@ -218,6 +218,18 @@ TEST_F(CommandLine, TrajectoryThatWouldLeaveTheStomach) {
       << outcome.error;
 }
 
+TEST_F(CommandLine, FailedCellExitsWithThree) {
+  write("tiny.yaml", kTinyCamera);
+  write("study.yaml",
+        "title: tiny\nresolution: coarse\nframes: 4\ncameras: [tiny.yaml]\ntrajectories: ['1']\n"
+        "commands: {broken: ['false']}\nmethods: [broken]\n");
+  const Outcome outcome = rugae("run study.yaml --out out --json");
+  EXPECT_EQ(outcome.code, kNotAsAsked) << outcome.error;
+  const auto result = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(result.at("cells"), 1);
+  EXPECT_EQ(result.at("failed_cells"), 1);
+}
+
 TEST_F(CommandLine, FailedGateExitsWithThree) {
   write("tiny.yaml", kTinyCamera);
   write("study.yaml",
@@ -225,7 +237,7 @@ TEST_F(CommandLine, FailedGateExitsWithThree) {
         "methods: [paper]\ngates:\n  - {metric: tracking.tracked_share, above: 2, reason: cannot "
         "be}\n");
   const Outcome outcome = rugae("run study.yaml --out out");
-  EXPECT_EQ(outcome.code, kGateFailed) << outcome.error;
+  EXPECT_EQ(outcome.code, kNotAsAsked) << outcome.error;
   EXPECT_NE(outcome.error.find("gate failed: "), std::string::npos);
 }
 
