@@ -9,7 +9,7 @@
 namespace rugae {
 namespace {
 
-const std::vector<std::string> kMethods = {"paper"};
+const std::vector<std::string> kMethods = {"paper", "dense"};
 const std::vector<std::string> kInpaintings = {"telea", "navier_stokes"};
 
 }  // namespace
@@ -79,6 +79,12 @@ void fields(Visitor& v, MapOptions& o) {
 }
 
 template <typename Visitor>
+void fields(Visitor& v, RevisitOptions& o) {
+  v.number("rounds", o.rounds, 0, 100);
+  v.number("search_px", o.search_px, 0.0, 1000.0);
+}
+
+template <typename Visitor>
 void fields(Visitor& v, ReconOptions& o) {
   v.word("method", o.method, kMethods);
   v.section("preprocess", o.preprocess);
@@ -89,6 +95,7 @@ void fields(Visitor& v, ReconOptions& o) {
   v.section("mosaic", o.mosaic);
   v.section("shading", o.shading);
   v.section("map", o.map);
+  v.section("revisits", o.revisits);
   v.flag("pictures", o.pictures);
   v.seed("seed", o.seed);
 }
@@ -102,6 +109,7 @@ void BundleOptions::check() const { check_fields(*this, "bundle"); }
 void MosaicOptions::check() const { check_fields(*this, "mosaic"); }
 void ShadingOptions::check() const { check_fields(*this, "shading"); }
 void MapOptions::check() const { check_fields(*this, "map"); }
+void RevisitOptions::check() const { check_fields(*this, "revisits"); }
 void ReconOptions::check() const { check_fields(*this, "recon"); }
 
 void read_options(YamlReader yaml, ReconOptions& options) { read_fields(std::move(yaml), options); }

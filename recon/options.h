@@ -74,6 +74,13 @@ struct MapOptions {
   void check() const;
 };
 
+/// Of `dense`: wall seen again.
+struct RevisitOptions {
+  int rounds = 2;           // of looking for it and adjusting all; 0: none
+  double search_px = 24.0;  // around where a point should be seen, at 640 px width
+  void check() const;
+};
+
 struct ReconOptions {
   std::string method = "paper";
   PreprocessOptions preprocess;
@@ -84,6 +91,7 @@ struct ReconOptions {
   MosaicOptions mosaic;
   ShadingOptions shading;
   MapOptions map;
+  RevisitOptions revisits;
   bool pictures = true;  // intermediates for people
   std::uint64_t seed = 1;
   void check() const;

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "recon/dense/revisits.h"
 #include "recon/resection.h"
 
 namespace rugae {
@@ -14,8 +15,11 @@ Stages::Stages()
       }),
       structure([](const FrameSource& frames, const std::vector<int>& keyframes,
                    std::vector<Track> tracks, const ReconOptions& options, Progress& progress) {
-        return build_structure(keyframes, std::move(tracks), frames.lens(), options.bundle,
-                               progress);
+        Structure found =
+            build_structure(keyframes, std::move(tracks), frames.lens(), options.bundle, progress);
+        if (options.method == "dense")
+          link_revisits(frames, options.revisits, options.bundle, found, progress);
+        return found;
       }),
       resect([](const FrameSource& frames, const Structure& structure, const ReconOptions& options,
                 Progress& progress) {

@@ -106,12 +106,17 @@ Lens lens_of(int width, int height) {
   return lens;
 }
 
+double angle_of(const Options& options, int camera) {
+  const bool back = options.turn_at > 0 && camera >= options.turn_at;
+  return options.step_rad * (back ? 2 * options.turn_at - camera - 1.5 : camera);
+}
+
 World make_world(const Options& options) {
   World world;
-  world.lens = lens_of(640, 480);
+  world.lens = lens_of(options.width, options.width * 3 / 4);
   std::vector<Rigid3> cam_from_world_mm;
   for (int k = 0; k < options.cameras; ++k) {
-    cam_from_world_mm.push_back(world_from_camera(k * options.step_rad).inverse());
+    cam_from_world_mm.push_back(world_from_camera(angle_of(options, k)).inverse());
     Rigid3 pose = cam_from_world_mm.back().inverse();
     pose.translation *= options.unit;
     world.cam_from_world.push_back((options.moved * pose).inverse());
@@ -123,7 +128,7 @@ World make_world(const Options& options) {
     const Vec3 wall_mm = wall_radius_mm(direction) * direction;
     const Vec3 outward = outward_normal(direction);
     Track track;
-    for (int k = 0; k < options.cameras; ++k) {
+    for (int k = options.first_camera; k < options.cameras; ++k) {
       const Vec3 p_cam = cam_from_world_mm[k] * wall_mm;
       const auto pixel = world.lens.project(p_cam);
       const Vec3 sight = (wall_mm - cam_from_world_mm[k].inverse().translation).normalized();

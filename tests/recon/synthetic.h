@@ -17,7 +17,10 @@ namespace rugae::synthetic {
 struct Options {
   int cameras = 12;
   double step_rad = 0.1;       // of the path's angle between cameras: 5 mm at the default size
+  int turn_at = 0;             // this camera goes back, between the places of those before; 0: none
+  int width = 640;             // px, 4 : 3
   int points = 3000;           // on the whole wall
+  int first_camera = 0;        // that sees anything
   int max_run = 12;            // cameras a track lives for at most
   double noise_px = 0.0;       // standard deviation of each coordinate of an observation
   double outlier_share = 0.0;  // of observations moved by up to 40 px in each coordinate
@@ -38,6 +41,8 @@ struct World {
 double wall_radius_mm(const Vec3& direction);
 /// World from camera at an angle along the path, mm: inside the cavity, looking at the wall.
 Rigid3 world_from_camera(double angle_rad);
+/// The path's angle of a camera.
+double angle_of(const Options& options, int camera);
 Lens lens_of(int width, int height);
 World make_world(const Options& options);
 

@@ -1,0 +1,183 @@
+#include "recon/dense/wall_patch.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "recon/flow.h"
+
+namespace rugae {
+namespace {
+
+constexpr int kPlanePoints = 12;        // nearest in the picture, from which a tangent plane comes
+constexpr int kPlaneRounds = 3;         // of weighing down what lies off it
+constexpr double kPlaneShare = 0.03;    // of the depth: points further off the plane count less
+constexpr double kMinIncidence = 0.26;  // cosine, 75 degrees: more oblique pieces show nothing
+constexpr double kMinScale = 0.5, kMaxScale = 2.0;
+constexpr double kBorderPx = 2.0;
+constexpr int kFineHalfPx = 17;      // of the squares that are kept: a patch, its gradient
+constexpr int kCoarseHalfPx = 10;    // half a search template seen at half its size
+constexpr std::size_t kAtOnce = 16;  // key frames held at a time
+
+struct Point {
+  int track;
+  Vec2 pixel, ray;
+  double depth;
+};
+
+// 1 / z = a x + b y + c over rays (x, y, 1) is exact for a plane. The slope comes from the points
+// around, the plane goes through the point itself.
+std::optional<Vec3> inverse_depth_plane(const Point& centre, const std::vector<Point>& points) {
+  std::vector<std::pair<double, const Point*>> near;
+  for (const Point& p : points)
+    if (p.track != centre.track) near.emplace_back((p.pixel - centre.pixel).squaredNorm(), &p);
+  if (near.size() < static_cast<std::size_t>(kPlanePoints)) return std::nullopt;
+  std::nth_element(
+      near.begin(), near.begin() + kPlanePoints - 1, near.end(), [](const auto& a, const auto& b) {
+        return a.first != b.first ? a.first < b.first : a.second->track < b.second->track;
+      });
+  std::vector<double> weight(kPlanePoints, 1.0);
+  Vec2 slope = Vec2::Zero();
+  const double inverse = 1.0 / centre.depth;
+  for (int round = 0; round < kPlaneRounds; ++round) {
+    Mat2 normal = Mat2::Zero();
+    Vec2 right = Vec2::Zero();
+    for (int i = 0; i < kPlanePoints; ++i) {
+      const Point& p = *near[static_cast<std::size_t>(i)].second;
+      const Vec2 d = p.ray - centre.ray;
+      normal += weight[i] * d * d.transpose();
+      right += weight[i] * d * (1.0 / p.depth - inverse);
+    }
+    const Eigen::LDLT<Mat2> solver(normal);
+    const double smallest = solver.vectorD().minCoeff(), largest = solver.vectorD().maxCoeff();
+    if (!(smallest > 1e-3 * largest)) return std::nullopt;  // all on a line
+    slope = solver.solve(right);
+    for (int i = 0; i < kPlanePoints; ++i) {
+      const Point& p = *near[static_cast<std::size_t>(i)].second;
+      const double off =
+          (1.0 / p.depth - inverse - slope.dot(p.ray - centre.ray)) * centre.depth / kPlaneShare;
+      weight[i] = 1.0 / (1.0 + off * off);
+    }
+  }
+  return Vec3(slope.x(), slope.y(), inverse - slope.dot(centre.ray));
+}
+
+// A whole-pixel square around a point and the point's place in it; false when it leaves the image.
+bool cut(const cv::Mat& image, const Vec2& pixel, int half, cv::Mat& square, Vec2& place) {
+  const int x = static_cast<int>(std::floor(pixel.x())) - half,
+            y = static_cast<int>(std::floor(pixel.y())) - half, side = 2 * half + 1;
+  if (x < 0 || y < 0 || x + side > image.cols || y + side > image.rows) return false;
+  square = image(cv::Rect(x, y, side, side)).clone();
+  place = pixel - Vec2(x, y);
+  return true;
+}
+
+// Of one key frame: the patches anchored in it.
+std::vector<WallPatch> patches_of(const PatchImage& image, const Lens& lens,
+                                  const Structure& structure, int keyframe,
+                                  const std::vector<Point>& points,
+                                  const std::vector<char>& anchored) {
+  std::vector<WallPatch> patches;
+  const Rigid3 world_from_cam = structure.cam_from_world[keyframe].inverse();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!anchored[i]) continue;
+    const Point& p = points[i];
+    const auto plane = inverse_depth_plane(p, points);
+    if (!plane) continue;
+    const Vec3 ray(p.ray.x(), p.ray.y(), 1.0);
+    const Vec3 normal = plane->normalized();  // away from the camera: plane . X = 1
+    if (!(normal.dot(ray.normalized()) >= kMinIncidence)) continue;
+    WallPatch patch;
+    patch.track = p.track;
+    patch.anchor = keyframe;
+    patch.anchor_px = p.pixel;
+    patch.centre = structure.tracks[static_cast<std::size_t>(p.track)].point;
+    patch.normal = -(world_from_cam.rotation * normal);
+    // X = ray / (plane . ray), so dX/dx = z e_x - z^2 a ray.
+    const double z = p.depth;
+    patch.along_x =
+        world_from_cam.rotation * (z * Vec3::UnitX() - z * z * plane->x() * ray) / lens.fx;
+    patch.along_y =
+        world_from_cam.rotation * (z * Vec3::UnitY() - z * z * plane->y() * ray) / lens.fy;
+    if (!cut(image.fine, p.pixel, kFineHalfPx, patch.fine, patch.fine_px)) continue;
+    if (!cut(image.coarse, p.pixel / image.shrink, kCoarseHalfPx, patch.coarse, patch.coarse_px))
+      patch.coarse.release();  // near the border: followed, but not looked for
+    patches.push_back(std::move(patch));
+  }
+  return patches;
+}
+
+}  // namespace
+
+PatchImage prepare_patch_image(const Frame& frame) {
+  PatchImage image;
+  frame.gray.convertTo(image.fine, CV_32F, 1.0 / 255.0);
+  image.shrink = std::max(1.0, frame.gray.cols / static_cast<double>(kCoarseWidthPx));
+  const cv::Size size(static_cast<int>(std::lround(frame.gray.cols / image.shrink)),
+                      static_cast<int>(std::lround(frame.gray.rows / image.shrink)));
+  cv::Mat small, valid;
+  cv::resize(frame.gray, small, size, 0, 0, cv::INTER_AREA);
+  cv::resize(frame.valid, valid, size, 0, 0, cv::INTER_AREA);
+  image.coarse = even_light(small, valid == 255);
+  image.usable = frame.valid & ~frame.reflection;
+  return image;
+}
+
+std::optional<PatchSight> foretell(const WallPatch& patch, const Rigid3& cam_from_world,
+                                   const LensProjector& lens) {
+  const Vec3 p_cam = cam_from_world * patch.centre;
+  if (!(p_cam.z() > 0.0)) return std::nullopt;
+  const Vec3 normal_cam = cam_from_world.rotation * patch.normal;
+  if (!(-normal_cam.dot(p_cam.normalized()) >= kMinIncidence)) return std::nullopt;
+  const auto pixel = lens.project(p_cam);
+  if (!pixel || !lens.contains(*pixel)) return std::nullopt;
+  PatchSight sight{*pixel, Mat2::Zero()};
+  const Vec3 x_cam = cam_from_world.rotation * patch.along_x,
+             y_cam = cam_from_world.rotation * patch.along_y;
+  for (int axis = 0; axis < 2; ++axis) {
+    const Vec3& step = axis == 0 ? x_cam : y_cam;
+    const auto ahead = lens.project(p_cam + step), behind = lens.project(p_cam - step);
+    if (!ahead || !behind) return std::nullopt;
+    sight.linear.col(axis) = 0.5 * (*ahead - *behind);
+  }
+  const Vec2 scales = Eigen::JacobiSVD<Mat2>(sight.linear).singularValues();
+  if (!(scales[1] >= kMinScale && scales[0] <= kMaxScale)) return std::nullopt;
+  return sight;
+}
+
+std::vector<WallPatch> make_patches(const FrameSource& frames, const Structure& structure) {
+  const std::size_t n = structure.frames.size();
+  std::vector<std::vector<Point>> points(n);
+  std::vector<std::vector<char>> anchored(n);
+  for (std::size_t t = 0; t < structure.tracks.size(); ++t) {
+    const Track& track = structure.tracks[t];
+    if (!track.triangulated || track.observations.empty()) continue;
+    const std::size_t middle = track.observations.size() / 2;
+    for (std::size_t i = 0; i < track.observations.size(); ++i) {
+      const Track::Observation& o = track.observations[i];
+      const double depth = (structure.cam_from_world[o.keyframe] * track.point).z();
+      points[o.keyframe].push_back({static_cast<int>(t), o.pixel, o.ray, depth});
+      anchored[o.keyframe].push_back(i == middle);
+    }
+  }
+  std::vector<std::vector<WallPatch>> found(n);
+  for (std::size_t begin = 0; begin < n; begin += kAtOnce) {
+    tbb::parallel_for(begin, std::min(n, begin + kAtOnce), [&](std::size_t k) {
+      if (!structure.placed[k] || points[k].empty()) return;
+      const PatchImage image = prepare_patch_image(frames.pose_frame(structure.frames[k]));
+      found[k] =
+          patches_of(image, frames.lens(), structure, static_cast<int>(k), points[k], anchored[k]);
+    });
+  }
+  std::vector<WallPatch> patches;
+  for (std::vector<WallPatch>& of_frame : found)
+    std::move(of_frame.begin(), of_frame.end(), std::back_inserter(patches));
+  return patches;
+}
+
+}  // namespace rugae

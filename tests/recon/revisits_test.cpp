@@ -1,0 +1,155 @@
+// Wall seen again: what geometry foretells of a patch, and the drift that revisits take out.
+
+#include "recon/dense/revisits.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+
+#include "core/files.h"
+#include "synthetic.h"
+
+namespace rugae {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A camera that goes there and comes back: no track lives to see the same wall twice.
+class Revisits : public testing::Test {
+ protected:
+  static constexpr int kThere = 9, kCameras = 18;
+  static synthetic::Options path() {
+    return {.cameras = kCameras,
+            .step_rad = 0.12,
+            .turn_at = kThere,
+            .width = 320,
+            .points = 1200,
+            .max_run = 5,
+            .noise_px = 0.3};
+  }
+
+  static void SetUpTestSuite() {
+    root_ = fs::path(testing::TempDir()) / fmt::format("rugae_revisits_{}", getpid());
+    fs::remove_all(root_);
+    std::vector<Rigid3> poses;
+    for (int k = 0; k < kCameras; ++k)
+      poses.push_back(synthetic::world_from_camera(synthetic::angle_of(path(), k)));
+    recording_ = synthetic::record(root_, synthetic::lens_of(320, 240), poses, 1.0);
+    world_ = synthetic::make_world(path());
+    for (int first = 2; first + 2 < kCameras; first += 2) {
+      synthetic::Options later = path();
+      later.first_camera = first;
+      later.seed = static_cast<std::uint64_t>(first);
+      const synthetic::World more = synthetic::make_world(later);
+      world_.tracks.insert(world_.tracks.end(), more.tracks.begin(), more.tracks.end());
+    }
+    Progress progress(Progress::Output::silent);
+    chain_ = build_structure(world_.frames, world_.tracks, world_.lens, BundleOptions{}, progress);
+  }
+  static void TearDownTestSuite() { fs::remove_all(root_); }
+
+  static FrameSource frames() {
+    PreprocessOptions options;
+    options.devignette = false;
+    return {Observations::open(recording_.images, recording_.calibration), options};
+  }
+  static Structure linked() {
+    Progress progress(Progress::Output::silent);
+    Structure structure = chain_;
+    link_revisits(frames(), RevisitOptions{}, BundleOptions{}, structure, progress);
+    return structure;
+  }
+
+  static fs::path root_;
+  static synthetic::Recording recording_;
+  static synthetic::World world_;
+  static Structure chain_;
+};
+fs::path Revisits::root_;
+synthetic::Recording Revisits::recording_;
+synthetic::World Revisits::world_;
+Structure Revisits::chain_;
+
+// Patches made in the true structure land where the wall is: their centres to rounding, their
+// derivatives to what a tangent plane from points 2 mm apart on folds can be.
+TEST_F(Revisits, PatchesAreForetoldWhereTheirWallIsSeen) {
+  const auto patches = make_patches(frames(), chain_);
+  ASSERT_GT(patches.size(), chain_.tracks.size() / 2);
+  const LensProjector lens(world_.lens);
+  int sights = 0;
+  double sum = 0.0;
+  for (const WallPatch& patch : patches) {
+    const Track& track = chain_.tracks[static_cast<std::size_t>(patch.track)];
+    for (const auto& o : track.observations) {
+      const auto sight = foretell(patch, chain_.cam_from_world[o.keyframe], lens);
+      if (!sight) continue;
+      EXPECT_LT((sight->pixel - o.pixel).norm(), 3.5);  // what the adjustment let pass, 3 px
+      if (o.keyframe == patch.anchor) {
+        EXPECT_LT((sight->linear - Mat2::Identity()).norm(), 1e-2);
+      }
+      ++sights;
+      sum += (sight->pixel - o.pixel).norm();
+    }
+  }
+  EXPECT_GT(sights, 4000);
+  EXPECT_LT(sum / sights, 1.0);
+}
+
+TEST_F(Revisits, TakeOutTheDrift) {
+  ASSERT_EQ(chain_.placed_count(), kCameras);
+  const Structure s = linked();
+  ASSERT_EQ(s.placed_count(), kCameras);
+  const double before = synthetic::path_error(chain_, world_).rmse;
+  const double after = synthetic::path_error(s, world_).rmse;
+  std::printf("path error %.4f mm in a chain, %.4f mm linked\n", before, after);
+  EXPECT_TRUE(after <= 0.5 * before) << before << " " << after;
+  // Tracks that were begun on the way there are seen on the way back.
+  int both = 0;
+  for (const Track& track : s.tracks)
+    both += track.observations.front().keyframe < kThere - 4 &&
+            track.observations.back().keyframe > kThere + 4;
+  EXPECT_GT(both, 50);
+}
+
+// A camera that is thought to look elsewhere, by 70 degrees, finds nothing of what it should see.
+TEST_F(Revisits, WrongSightsAreNotAccepted) {
+  Structure astray = chain_;
+  for (int k = kThere; k < kCameras; ++k)
+    astray.cam_from_world[k] = Rigid3(Quat(Eigen::AngleAxisd(1.22, Vec3::UnitY())), Vec3::Zero()) *
+                               astray.cam_from_world[k];
+  const auto patches = make_patches(frames(), chain_);
+  Progress progress(Progress::Output::silent);
+  const auto seen_on_the_way_back = [](const Structure& structure) {
+    std::ptrdiff_t count = 0;
+    for (const Track& track : structure.tracks)
+      count += std::ranges::count_if(track.observations,
+                                     [](const auto& o) { return o.keyframe >= kThere; });
+    return count;
+  };
+  Structure right = chain_;
+  observe_again(frames(), patches, {}, {}, right, progress);
+  observe_again(frames(), patches, {}, {}, astray, progress);
+  const std::ptrdiff_t chain = seen_on_the_way_back(chain_);
+  const std::ptrdiff_t found = seen_on_the_way_back(right) - chain;
+  const std::ptrdiff_t wrong = seen_on_the_way_back(astray) - chain;
+  EXPECT_GT(found, 500);
+  EXPECT_LT(20 * wrong, found) << wrong;
+}
+
+TEST_F(Revisits, TheNumberOfThreadsChangesNothing) {
+  const Structure two = linked();
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 1);
+  const Structure one = linked();
+  ASSERT_EQ(one.tracks.size(), two.tracks.size());
+  for (std::size_t t = 0; t < one.tracks.size(); ++t)
+    EXPECT_EQ(one.tracks[t].point, two.tracks[t].point);
+  for (int k = 0; k < kCameras; ++k)
+    EXPECT_EQ(one.cam_from_world[k].translation, two.cam_from_world[k].translation);
+}
+
+}  // namespace
+}  // namespace rugae
