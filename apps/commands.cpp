@@ -113,7 +113,7 @@ void add_reconstruct(CLI::App& app) {
       *app.add_subcommand("reconstruct", "Estimate the path and the wall from frames alone");
   command.add_option("input", a->input, "A dataset, or a folder of images with --calibration")
       ->required();
-  command.add_option("--method", a->method, "paper")->capture_default_str();
+  command.add_option("--method", a->method, "paper or dense")->capture_default_str();
   command.add_option("--calibration", a->calibration, "Lens YAML; replaces the dataset's own");
   command.add_option("--fps", a->fps, "Frame rate of a plain folder of images")
       ->capture_default_str();

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "recon/dense/frame_poses.h"
 #include "recon/dense/revisits.h"
 #include "recon/resection.h"
 
@@ -23,6 +24,9 @@ Stages::Stages()
       }),
       resect([](const FrameSource& frames, const Structure& structure, const ReconOptions& options,
                 Progress& progress) {
+        if (options.method == "dense")
+          return place_frames(frames, structure, make_patches(frames, structure), options.bundle,
+                              progress);
         return resect_frames(frames, structure, options.align, options.bundle, options.seed,
                              progress);
       }),

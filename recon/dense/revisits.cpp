@@ -3,15 +3,10 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 
-#include "recon/bundle.h"
-#include "recon/growth.h"
-#include "recon/refine.h"
+#include "recon/dense/register_patch.h"
 #include "recon/resection.h"
 #include "recon/tracks.h"
 
@@ -19,14 +14,9 @@ namespace rugae {
 namespace {
 
 constexpr double kReferenceWidthPx = 640.0;
-constexpr double kPatchRadiusPx = 12.0;  // of the registration, at 640 px width
-constexpr double kMinCorrelation = 0.7;  // of registered patches
-constexpr double kMaxShiftPx = 1.5;      // by which registration may move a track's observation
-constexpr int kTemplateHalfPx = 4;       // of the search, coarse
-constexpr float kMinSearchScore = 0.6F;
+constexpr double kMaxShiftPx = 1.5;  // by which registration may move a track's observation
 constexpr std::size_t kAtOnce = 16;  // key frames between two steps of the progress line
 constexpr int kGroupGap = 8;         // key frames between the anchors of one group
-constexpr double kOutlierHubers = 3.0;
 
 // A patch seen in a key frame.
 struct Seen {
@@ -39,52 +29,6 @@ struct FrameResult {
   std::vector<Seen> registered, added;
   std::size_t foretold = 0, found = 0;
 };
-
-// The anchor's coarse square as the key frame sees it: a square template around the point.
-cv::Mat warped_template(const WallPatch& patch, const Mat2& linear) {
-  constexpr int kSide = 2 * kTemplateHalfPx + 1;
-  const Mat2 back = linear.inverse();
-  cv::Mat places(kSide, kSide, CV_32FC2), result;
-  for (int y = 0; y < kSide; ++y)
-    for (int x = 0; x < kSide; ++x) {
-      const Vec2 at =
-          patch.coarse_px + back * Vec2(x - kTemplateHalfPx, y - kTemplateHalfPx) - Vec2(0.5, 0.5);
-      places.at<cv::Vec2f>(y, x) = {static_cast<float>(at.x()), static_cast<float>(at.y())};
-    }
-  cv::remap(patch.coarse, result, places, {}, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-  return result;
-}
-
-// The pixel within `reach_px` (coarse) of the foretold one where the patch fits best.
-std::optional<Vec2> search(const WallPatch& patch, const PatchSight& sight, const PatchImage& image,
-                           int reach_px) {
-  if (patch.coarse.empty()) return std::nullopt;
-  const Vec2 at = sight.pixel / image.shrink;
-  const int x = static_cast<int>(std::floor(at.x())), y = static_cast<int>(std::floor(at.y()));
-  const int half = kTemplateHalfPx + reach_px;
-  const cv::Rect window = cv::Rect(x - half, y - half, 2 * half + 1, 2 * half + 1) &
-                          cv::Rect({0, 0}, image.coarse.size());
-  constexpr int kSide = 2 * kTemplateHalfPx + 1;
-  if (window.width < kSide || window.height < kSide) return std::nullopt;
-  // The template's middle stands for the point, whatever its fraction of a pixel.
-  cv::Mat scores;
-  cv::matchTemplate(image.coarse(window), warped_template(patch, sight.linear), scores,
-                    cv::TM_CCOEFF_NORMED);
-  double best = 0.0;
-  cv::Point place;
-  cv::minMaxLoc(scores, nullptr, &best, nullptr, &place);
-  if (!(best >= kMinSearchScore)) return std::nullopt;
-  const Vec2 middle(window.x + place.x + kTemplateHalfPx + 0.5,
-                    window.y + place.y + kTemplateHalfPx + 0.5);
-  return middle * image.shrink;
-}
-
-bool usable_at(const cv::Mat& usable, const Vec2& pixel) {
-  const int x = static_cast<int>(std::floor(pixel.x())),
-            y = static_cast<int>(std::floor(pixel.y()));
-  return x >= 0 && y >= 0 && x < usable.cols && y < usable.rows &&
-         usable.at<unsigned char>(y, x) != 0;
-}
 
 // Groups of `candidates`, which ascend by anchor: a gap between anchors begins another.
 std::vector<std::pair<std::size_t, std::size_t>> groups_by_anchor(
@@ -141,14 +85,9 @@ FrameResult look_in(int keyframe, const PatchImage& image, const std::vector<Wal
                     const std::vector<int>& known, const Structure& structure, const Lens& lens,
                     const RevisitOptions& options, const BundleOptions& bundle) {
   const double scale = lens.width / kReferenceWidthPx;
-  PointRefinementOptions refinement;
-  refinement.radius_px = kPatchRadiusPx * scale;
-  refinement.min_correlation = kMinCorrelation;
-  refinement.max_motion_px = 4.0 * scale;
-  const PointRefiner refiner(refinement);
+  const PatchRegistrar registrar(lens);
   const LensProjector projector(lens);
   const Rigid3& pose = structure.cam_from_world[static_cast<std::size_t>(keyframe)];
-  const int reach_px = static_cast<int>(std::ceil(options.search_px * scale / image.shrink));
   FrameResult result;
   std::vector<Seen> candidates;
   for (std::size_t p = 0; p < patches.size(); ++p) {
@@ -156,24 +95,19 @@ FrameResult look_in(int keyframe, const PatchImage& image, const std::vector<Wal
     if (patch.anchor == keyframe) continue;
     const auto sight = foretell(patch, pose, projector);
     if (!sight) continue;
-    std::optional<Vec2> start;
     if (known[p] >= 0) {
-      start = structure.tracks[static_cast<std::size_t>(patch.track)]
-                  .observations[static_cast<std::size_t>(known[p])]
-                  .pixel;
-    } else {
-      if (!usable_at(image.usable, sight->pixel)) continue;
-      ++result.foretold;
-      start = search(patch, *sight, image, reach_px);
+      const Vec2 start = structure.tracks[static_cast<std::size_t>(patch.track)]
+                             .observations[static_cast<std::size_t>(known[p])]
+                             .pixel;
+      const auto pixel = registrar.settle(patch, *sight, image, start);
+      if (pixel && (*pixel - start).norm() <= kMaxShiftPx * scale)
+        result.registered.push_back({p, *pixel, known[p]});
+      continue;
     }
-    if (!start) continue;
-    const auto pixel = refiner(patch.fine, image.fine, patch.fine_px, *start, sight->linear);
-    if (!pixel || !usable_at(image.usable, *pixel)) continue;
-    if (known[p] < 0) {
-      candidates.push_back({p, *pixel});
-    } else if ((*pixel - *start).norm() <= kMaxShiftPx * scale) {
-      result.registered.push_back({p, *pixel, known[p]});
-    }
+    if (!usable_at(image.usable, sight->pixel)) continue;
+    ++result.foretold;
+    const auto pixel = registrar.find(patch, *sight, image, options.search_px * scale);
+    if (pixel) candidates.push_back({p, *pixel});
   }
   result.found = candidates.size();
   result.added = agreeing(candidates, patches, lens, bundle);

@@ -1,0 +1,97 @@
+#include "recon/dense/register_patch.h"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace rugae {
+namespace {
+
+constexpr double kReferenceWidthPx = 640.0;
+constexpr double kRadiusPx = 12.0;    // of the registration, at 640 px width
+constexpr double kMaxMotionPx = 4.0;  // from its start, likewise
+constexpr double kMinCorrelation = 0.7;
+constexpr int kTemplateHalfPx = 4;  // of the search, coarse
+constexpr int kTemplateSide = 2 * kTemplateHalfPx + 1;
+constexpr double kMinSearchScore = 0.6;
+
+PointRefinementOptions refinement_of(const Lens& lens) {
+  const double scale = lens.width / kReferenceWidthPx;
+  PointRefinementOptions options;
+  options.radius_px = kRadiusPx * scale;
+  options.max_motion_px = kMaxMotionPx * scale;
+  options.min_correlation = kMinCorrelation;
+  return options;
+}
+
+// The anchor's coarse square as the frame sees it, around the point.
+cv::Mat warped_template(const WallPatch& patch, const Mat2& linear) {
+  const Mat2 back = linear.inverse();
+  cv::Mat places(kTemplateSide, kTemplateSide, CV_32FC2), result;
+  for (int y = 0; y < kTemplateSide; ++y)
+    for (int x = 0; x < kTemplateSide; ++x) {
+      const Vec2 at =
+          patch.coarse_px + back * Vec2(x - kTemplateHalfPx, y - kTemplateHalfPx) - Vec2(0.5, 0.5);
+      places.at<cv::Vec2f>(y, x) = {static_cast<float>(at.x()), static_cast<float>(at.y())};
+    }
+  cv::remap(patch.coarse, result, places, {}, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  return result;
+}
+
+// Where a parabola through a maximum and its neighbours peaks, from the maximum, in pixels.
+double peak_offset(float before, float at, float after) {
+  const double bend = static_cast<double>(before) - 2.0 * at + after;
+  return bend < 0.0 ? 0.5 * (static_cast<double>(before) - after) / bend : 0.0;
+}
+
+}  // namespace
+
+bool usable_at(const cv::Mat& usable, const Vec2& pixel) {
+  const int x = static_cast<int>(std::floor(pixel.x())),
+            y = static_cast<int>(std::floor(pixel.y()));
+  return x >= 0 && y >= 0 && x < usable.cols && y < usable.rows &&
+         usable.at<unsigned char>(y, x) != 0;
+}
+
+PatchRegistrar::PatchRegistrar(const Lens& lens) : refiner_(refinement_of(lens)) {}
+
+std::optional<Vec2> PatchRegistrar::search(const WallPatch& patch, const PatchSight& sight,
+                                           const PatchImage& image, double reach_px) const {
+  if (patch.coarse.empty()) return std::nullopt;
+  const Vec2 at = sight.pixel / image.shrink;
+  const int x = static_cast<int>(std::floor(at.x())), y = static_cast<int>(std::floor(at.y()));
+  const int half = kTemplateHalfPx + static_cast<int>(std::ceil(reach_px / image.shrink));
+  const cv::Rect window = cv::Rect(x - half, y - half, 2 * half + 1, 2 * half + 1) &
+                          cv::Rect({0, 0}, image.coarse.size());
+  if (window.width < kTemplateSide || window.height < kTemplateSide) return std::nullopt;
+  cv::Mat scores;
+  cv::matchTemplate(image.coarse(window), warped_template(patch, sight.linear), scores,
+                    cv::TM_CCOEFF_NORMED);
+  double best = 0.0;
+  cv::Point place;
+  cv::minMaxLoc(scores, nullptr, &best, nullptr, &place);
+  if (!(best >= kMinSearchScore)) return std::nullopt;
+  Vec2 middle(window.x + place.x + kTemplateHalfPx + 0.5,
+              window.y + place.y + kTemplateHalfPx + 0.5);
+  const auto score = [&](int dx, int dy) { return scores.at<float>(place.y + dy, place.x + dx); };
+  if (place.x > 0 && place.x + 1 < scores.cols)
+    middle.x() += peak_offset(score(-1, 0), score(0, 0), score(1, 0));
+  if (place.y > 0 && place.y + 1 < scores.rows)
+    middle.y() += peak_offset(score(0, -1), score(0, 0), score(0, 1));
+  return middle * image.shrink;
+}
+
+std::optional<Vec2> PatchRegistrar::settle(const WallPatch& patch, const PatchSight& sight,
+                                           const PatchImage& image, const Vec2& start) const {
+  const auto pixel = refiner_(patch.fine, image.fine, patch.fine_px, start, sight.linear);
+  return pixel && usable_at(image.usable, *pixel) ? pixel : std::nullopt;
+}
+
+std::optional<Vec2> PatchRegistrar::find(const WallPatch& patch, const PatchSight& sight,
+                                         const PatchImage& image, double reach_px) const {
+  const auto start = search(patch, sight, image, reach_px);
+  return start ? settle(patch, sight, image, *start) : std::nullopt;
+}
+
+}  // namespace rugae
