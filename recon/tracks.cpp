@@ -18,7 +18,10 @@ namespace {
 constexpr double kReferenceWidth = 640.0;  // pixel options are meant at this width
 constexpr double kCornerQuality = 0.002;  // of the best corner: weak texture counts, noise does not
 constexpr int kCornerBlock = 7;           // px
-constexpr int kBorder = 8;                // px: no corner nearer to where the image ends
+// Of the points of a key frame, those found in the next: three quarters as a rule, less than this
+// where the next comes too late.
+constexpr double kMinFollowedShare = 0.5;
+constexpr int kBorder = 8;  // px: no corner nearer to where the image ends
 
 // Occupied cells of side `spacing`: a point is taken when another lies within `spacing` of it.
 class Occupied {
@@ -216,12 +219,20 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
     std::vector<std::optional<PairAlignment>> found;
     if (k + 1 < at.size()) {
       found.push_back(follow_next(load(at[k + 1]).image));
-      // Algorithm 2 goes by a flow that fast motion escapes: what it measures is then too little,
-      // and the next key frame comes too late. The one half way becomes a key frame too.
-      for (int next = at[k + 1]; !found[0] && next - at[k] > 1;) {
+      // Algorithm 2 goes by a mean flow that fast motion escapes, and a near wall's beside a far
+      // one's: the next key frame then comes too late, and the points are lost on the way to it.
+      // The one half way becomes a key frame too.
+      const auto kept = [](const std::optional<PairAlignment>& pair) {
+        return pair ? pair->point_index.size() : 0;
+      };
+      const double enough = kMinFollowedShare * static_cast<double>(points.size());
+      for (int next = at[k + 1];
+           static_cast<double>(kept(found[0])) < enough && next - at[k] > 1;) {
         next = at[k] + (next - at[k]) / 2;
-        found[0] = follow_next(load(next).image);
-        if (found[0]) at.insert(at.begin() + static_cast<std::ptrdiff_t>(k) + 1, next);
+        auto nearer = follow_next(load(next).image);
+        if (kept(nearer) <= kept(found[0])) continue;
+        found[0] = std::move(nearer);
+        at.insert(at.begin() + static_cast<std::ptrdiff_t>(k) + 1, next);
       }
     }
     // To those after it: the motion to the next goes on.

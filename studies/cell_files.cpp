@@ -13,8 +13,9 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-// Raised when the same settings give other results, so that older ones are not taken for new.
-constexpr int kResultsVersion = 3;
+// Raised when the same settings give other frames or labels, or other estimates and metrics of the
+// same frames, so that older ones are not taken for new.
+constexpr int kRenderingVersion = 3, kResultsVersion = 4;
 constexpr std::size_t kHashLetters = 10;
 
 // A preset may build on another of its kind, so all of them count, and a file on other files.
@@ -36,7 +37,7 @@ json dataset_key(const Variant& variant, const Cell& cell, const std::string& ca
   const SimulateOptions& s = variant.simulate;
   const std::string scene =
       sha256_of_bytes(preset_hash("scenes", "scene", s.scene) + variant.scene_text);
-  return {{"version", kResultsVersion},
+  return {{"version", kRenderingVersion},
           {"scene", scene},
           {"camera", preset_hash("cameras", "camera", camera)},
           {"trajectory", preset_hash("trajectories", "trajectory", cell.trajectory)},
@@ -109,7 +110,7 @@ CellFiles files_of(const StudyOptions& study, const Cell& cell, const fs::path& 
   files.dataset = files.frames = dataset(data_key);
   if (!variant.scene_text.empty())
     files.scene = out / "scenes" / (short_hash(variant.scene_text) + ".yaml");
-  json key = {{"dataset", data_key}};
+  json key = {{"version", kResultsVersion}, {"dataset", data_key}};
   if (variant.replace == Replace::frames) {
     const json clean_key = dataset_key(with_clean_frames(variant), cell, files.camera);
     files.frames = dataset(clean_key);

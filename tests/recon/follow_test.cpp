@@ -57,6 +57,19 @@ TEST_F(FollowTracks, AKeyFrameThatComesTooLateGetsOthersBeforeIt) {
   for (int k = 0; k < 4; ++k) EXPECT_GE(shared(followed.tracks, k, k + 1), 30) << k;
 }
 
+// The far wall can be followed over four frames, the near one, three fifths of the picture, cannot.
+TEST_F(FollowTracks, AKeyFrameThatLosesTheNearWallGetsOthersBeforeIt) {
+  constexpr int kNearRow = 96, kTimes = 6;
+  const Followed followed =
+      follow(source({6, 6, 6, 6}, plain(), ~std::size_t{0}, {kNearRow, kTimes}), {0, 4});
+  ASSERT_GT(followed.keyframes.size(), 2u);
+  std::vector<Track> near;
+  for (const Track& track : followed.tracks)
+    if (track.observations.front().pixel.y() > kNearRow + 20) near.push_back(track);
+  for (int k = 0; k + 1 < static_cast<int>(followed.keyframes.size()); ++k)
+    EXPECT_GE(shared(near, k, k + 1), 30) << followed.keyframes[k];
+}
+
 TEST_F(FollowTracks, WhereTheWallIsAnotherTheChainBreaksAndNoKeyFrameComesBetween) {
   const Followed followed = follow(source({8, 8, 8, 8, 8}, plain(), 3), {0, 2, 4, 5});
   EXPECT_EQ(followed.keyframes, (std::vector<int>{0, 2, 4, 5}));

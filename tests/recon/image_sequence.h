@@ -18,6 +18,11 @@
 
 namespace rugae::testing {
 
+/// The rows from `row` on see another wall, nearer: its steps are so many times as long.
+struct Near {
+  int row = 1 << 20, times = 1;
+};
+
 class ImageSequence : public ::testing::Test {
  public:
   static constexpr int kWidth = 320, kHeight = 240;
@@ -35,7 +40,7 @@ class ImageSequence : public ::testing::Test {
   /// The wall moves to the left by whole steps, px a frame; 600 px of it in all. From frame
   /// `other_wall_from` on another wall is seen.
   FrameSource source(const std::vector<double>& steps_px, const PreprocessOptions& options,
-                     std::size_t other_wall_from = ~std::size_t{0}) {
+                     std::size_t other_wall_from = ~std::size_t{0}, const Near& near = {}) {
     const auto wall = [&](std::uint64_t seed) {
       return draw(kWidth + 600, kHeight, Texture(seed, 7.0, 60.0));
     };
@@ -45,7 +50,13 @@ class ImageSequence : public ::testing::Test {
       if (i > 0) shift += steps_px[i - 1];
       cv::Mat bgr;
       const cv::Rect view(static_cast<int>(shift), 0, kWidth, kHeight);
-      cv::cvtColor(to_8bit((i < other_wall_from ? first : other)(view)), bgr, cv::COLOR_GRAY2BGR);
+      cv::Mat gray = to_8bit((i < other_wall_from ? first : other)(view));
+      if (near.row < kHeight) {
+        const int side = kHeight - near.row;
+        const cv::Rect nearer(static_cast<int>(shift) * near.times, 0, kWidth, side);
+        to_8bit(other(nearer)).copyTo(gray(cv::Rect(0, near.row, kWidth, side)));
+      }
+      cv::cvtColor(gray, bgr, cv::COLOR_GRAY2BGR);
       write_image(folder_ / (std::to_string(i) + ".png"), bgr);
     }
     Lens lens;
