@@ -23,8 +23,8 @@ void list_paths(const json& node, const std::string& prefix, std::vector<std::st
 }
 
 bool names(const Gate& gate, const Cell& cell) {
-  const auto fits = [](const std::string& wanted, const std::string& is) {
-    return wanted.empty() || wanted == is;
+  const auto fits = [](const std::vector<std::string>& wanted, const std::string& is) {
+    return wanted.empty() || std::ranges::count(wanted, is) > 0;
   };
   for (const Setting& setting : gate.settings)
     if (std::ranges::count(cell.settings, setting) == 0) return false;
@@ -94,10 +94,10 @@ std::vector<GateOutcome> hold_gates(const std::vector<Gate>& gates,
     for (const CellResult& cell : cells)
       if (names(gate, cell.cell)) outcomes.push_back(hold(gate, cell));
     if (outcomes.size() == before)
-      outcomes.push_back({fmt::format("camera '{}', trajectory '{}', method '{}'", gate.camera,
-                                      gate.trajectory, gate.method),
-                          gate.metric, bounds(gate), "in no cell of the study", gate.reason,
-                          false});
+      outcomes.push_back(
+          {fmt::format("camera '{}', trajectory '{}', method '{}'", fmt::join(gate.camera, ", "),
+                       fmt::join(gate.trajectory, ", "), fmt::join(gate.method, ", ")),
+           gate.metric, bounds(gate), "in no cell of the study", gate.reason, false});
   }
   return outcomes;
 }

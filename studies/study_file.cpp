@@ -184,7 +184,7 @@ StudyOptions read_part_text(const std::string& text, const std::string& name) {
   read_methods(yaml, base.recon, study);
   const std::vector<Axis> axes = read_axes(yaml);
   for (YamlReader& gate : yaml.children("gates")) study.gates.push_back(read_gate(gate, axes));
-  study.summaries = read_summaries(yaml, axes);
+  study.summaries = read_summaries(yaml, axes, study.methods);
   yaml.finish();
   study.variants = read_variants(text, name, axes, study.cameras);
   return study;

@@ -17,8 +17,8 @@ struct Gate {
   std::string metric;  // a path into a cell's metrics, such as "trajectory.ate_sim3_rmse_mm"
   std::optional<double> above, below;
   std::string reason;
-  std::string camera, trajectory, method;  // empty: any
-  std::vector<Setting> settings;           // those it names must be the cell's
+  std::vector<std::string> camera, trajectory, method;  // any of these; empty: all
+  std::vector<Setting> settings;                        // those it names must be the cell's
 };
 
 /// What a cell is: the whole loop, or a single stage of it against the truth (studies/measure.h).

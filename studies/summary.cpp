@@ -59,7 +59,9 @@ SummaryTable table_of(const TableSpec& spec, const std::vector<CellResult>& cell
   for (const std::string& row : table.rows) {
     auto& entries = table.entries.emplace_back();
     for (const std::string& column : table.columns) {
-      entries.push_back(entry_of(spec, cells, {{spec.rows, row}, {spec.columns, column}}));
+      std::vector<Chosen> chosen = {{spec.rows, row}, {spec.columns, column}};
+      if (!spec.method.empty()) chosen.push_back({"method", spec.method});
+      entries.push_back(entry_of(spec, cells, chosen));
       entries.back().published = published(spec.published, row, column);
     }
   }

@@ -44,7 +44,8 @@ void read_what(YamlReader& yaml, Spec& spec) {
   yaml.get("scale", spec.scale);
 }
 
-TableSpec read_table(YamlReader yaml, const std::vector<Axis>& axes) {
+TableSpec read_table(YamlReader yaml, const std::vector<Axis>& axes,
+                     const std::vector<std::string>& methods) {
   TableSpec table;
   read_what(yaml, table);
   read_difference(yaml, "rows", axes, table.rows);
@@ -54,6 +55,10 @@ TableSpec read_table(YamlReader yaml, const std::vector<Axis>& axes) {
   check(table.published.empty() || std::ranges::count(known, table.published) > 0,
         "{}: published is '{}', expected one of: {}{}", yaml.where("published"), table.published,
         fmt::join(known, ", "), did_you_mean(table.published, known));
+  yaml.get("method", table.method);
+  check(table.method.empty() || std::ranges::count(methods, table.method) > 0,
+        "{}: method is '{}', expected one of: {}{}", yaml.where("method"), table.method,
+        fmt::join(methods, ", "), did_you_mean(table.method, methods));
   yaml.finish();
   return table;
 }
@@ -111,9 +116,11 @@ FindingSpec read_finding(YamlReader yaml, const std::vector<Axis>& axes) {
 
 }  // namespace
 
-SummarySpecs read_summaries(YamlReader& study, const std::vector<Axis>& axes) {
+SummarySpecs read_summaries(YamlReader& study, const std::vector<Axis>& axes,
+                            const std::vector<std::string>& methods) {
   SummarySpecs specs;
-  for (YamlReader& yaml : study.children("tables")) specs.tables.push_back(read_table(yaml, axes));
+  for (YamlReader& yaml : study.children("tables"))
+    specs.tables.push_back(read_table(yaml, axes, methods));
   for (YamlReader& yaml : study.children("curves")) specs.curves.push_back(read_curve(yaml, axes));
   for (YamlReader& yaml : study.children("bars")) specs.bars.push_back(read_bars(yaml, axes));
   for (YamlReader& yaml : study.children("findings"))

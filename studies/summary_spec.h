@@ -14,7 +14,8 @@ struct TableSpec {
   std::string title, metric, unit;
   double scale = 1.0;  // of the metric, to get the unit
   std::string rows = "trajectory", columns = "camera";
-  std::string published;  // a table of studies/published.yaml to stand beside ours
+  std::string published;    // a table of studies/published.yaml to stand beside ours
+  std::string method = "";  // of its cells alone; empty: of all
 };
 
 /// A metric over an axis of numbers, such as the strength of a nuisance.
@@ -48,9 +49,10 @@ struct SummarySpecs {
   std::vector<FindingSpec> findings;
 };
 
-/// Reads `tables`, `curves`, `bars` and `findings`. `axes` are the study's. Throws Error with the
-/// place for something that cells do not differ in, a value an axis does not have, a curve over an
-/// axis whose values are no numbers, and an unknown published table.
-SummarySpecs read_summaries(YamlReader& study, const std::vector<Axis>& axes);
+/// Reads `tables`, `curves`, `bars` and `findings`. `axes` and `methods` are the study's. Throws
+/// Error with the place for something that cells do not differ in, a value an axis does not have, a
+/// curve over an axis whose values are no numbers, and an unknown published table.
+SummarySpecs read_summaries(YamlReader& study, const std::vector<Axis>& axes,
+                            const std::vector<std::string>& methods);
 
 }  // namespace rugae

@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/files.h"
+#include "recon/dense/frame_poses.h"
 #include "synthetic.h"
 
 namespace rugae {
@@ -138,6 +139,28 @@ TEST_F(Revisits, WrongSightsAreNotAccepted) {
   const std::ptrdiff_t wrong = seen_on_the_way_back(astray) - chain;
   EXPECT_GT(found, 500);
   EXPECT_LT(20 * wrong, found) << wrong;
+}
+
+// Every second key frame but the last is taken out of the map and found in it again as a frame between others.
+TEST_F(Revisits, FramesBetweenArePlacedInTheMap) {
+  const Structure whole = linked();
+  Structure half = whole;
+  for (int k = 1; k + 1 < kCameras; k += 2) half.placed[k] = false;
+  for (Track& track : half.tracks)
+    std::erase_if(track.observations, [&](const auto& o) { return !half.placed[o.keyframe]; });
+  std::erase_if(half.tracks, [](const Track& track) { return track.observations.size() < 2; });
+  Progress progress(Progress::Output::silent);
+  const FrameSource source = frames();
+  const auto poses = place_frames(source, half, make_patches(source, half), {}, progress);
+  std::vector<Rigid3> estimated, truth;
+  for (int k = 0; k < kCameras; ++k) {
+    ASSERT_TRUE(poses[k].has_value()) << k;
+    estimated.push_back(poses[k]->inverse());
+    truth.push_back(world_.cam_from_world[k].inverse());
+  }
+  // Patches of 12 px found to a tenth of one, by the dozen: as good as the key frames themselves.
+  const double error = synthetic::path_error(estimated, truth).rmse;
+  EXPECT_TRUE(error <= 2.0 * synthetic::path_error(whole, world_).rmse) << error;
 }
 
 TEST_F(Revisits, TheNumberOfThreadsChangesNothing) {

@@ -65,14 +65,24 @@ TEST(Gates, AMisspeltMetricFailsAndOffersTheNearest) {
   EXPECT_EQ(outcome[0].found, "no such metric; did you mean 'tracking.tracked_share'?");
 }
 
+TEST(Gates, AGateMayNameSeveral) {
+  Gate some = gate("tracking.tracked_share", 0.5, {});
+  some.trajectory = {"1", "3"};
+  const auto outcomes =
+      hold_gates({some}, {cell("1", kMetrics), cell("2", kMetrics), cell("3", kMetrics)});
+  ASSERT_EQ(outcomes.size(), 2u);
+  EXPECT_EQ(outcomes[0].cell, "misumi-v5506, trajectory 1, paper");
+  EXPECT_EQ(outcomes[1].cell, "misumi-v5506, trajectory 3, paper");
+}
+
 TEST(Gates, AGateNamesItsCells) {
   Gate second = gate("tracking.tracked_share", 0.5, {});
-  second.trajectory = "2";
+  second.trajectory = {"2"};
   const std::vector<CellResult> cells{cell("1", kMetrics), cell("2", kMetrics)};
   const auto outcomes = hold_gates({second}, cells);
   ASSERT_EQ(outcomes.size(), 1u);
   EXPECT_EQ(outcomes[0].cell, "misumi-v5506, trajectory 2, paper");
-  second.trajectory = "7";
+  second.trajectory = {"7"};
   const auto none = hold_gates({second}, cells);
   ASSERT_EQ(none.size(), 1u);
   EXPECT_FALSE(none[0].passed);

@@ -192,6 +192,8 @@ TEST(StudyFile, SummariesNameWhatCellsDifferIn) {
   EXPECT_EQ(error_of(table("rows: step")),
             "study.yaml:4:40: rows is 'step', expected one of: camera, trajectory, method, seed, "
             "frames, steps; did you mean 'steps'?");
+  EXPECT_EQ(error_of(table("method: papr")),
+            "study.yaml:4:42: method is 'papr', expected one of: paper; did you mean 'paper'?");
   EXPECT_EQ(
       error_of(table("published: at")),
       "study.yaml:4:45: published is 'at', expected one of: ate, ate_preprocessing, features, "

@@ -46,6 +46,16 @@ TEST(Summary, ATableIsTheMeanOverAllElseBesideThePublished) {
           fmt::format("2,misumi-v5506,{},,1,1,43.2,{}\n", 0.1 * 3, 0.1 * 3 / 43.2));
 }
 
+TEST(Summary, ATableMayBeOfOneMethod) {
+  SummarySpecs specs;
+  specs.tables = {{"ATE", "trajectory.ate_mm", "mm", 1.0, "trajectory", "camera", "", "dense"}};
+  std::vector<CellResult> cells = {cell("1", "0", 10), cell("1", "0", 2)};
+  cells[1].cell.method = "dense";
+  const TableEntry entry = summarise(specs, cells).tables[0].entries[0][0];
+  EXPECT_EQ(entry.ours.count, 1);
+  EXPECT_EQ(entry.ours.mean, 2.0);
+}
+
 TEST(Summary, ACurveBreaksWhereTheErrorTriplesOrFramesAreLost) {
   SummarySpecs specs;
   specs.curves = {{"ATE", "trajectory.ate_mm", "mm", 1.0, "strength", "trajectory"}};
