@@ -7,11 +7,11 @@
 #include <limits>
 
 #include "recon/schur_blocks.h"
+#include "recon/schur_cost.h"
 
 namespace rugae {
 namespace {
 
-constexpr double kMinDepth = 1e-9;  // map units
 constexpr double kFirstRadius = 1e4, kLargestRadius = 1e16, kSmallestRadius = 1e-32;
 constexpr double kMinDiagonal = 1e-6, kMaxDiagonal = 1e32;  // of what the damping scales with
 constexpr double kMinQuality = 1e-3;           // of the gain that the quadratic model promises
@@ -23,53 +23,6 @@ using Mat6 = Eigen::Matrix<double, 6, 6>;
 using Mat63 = Eigen::Matrix<double, 6, 3>;
 using Mat26 = Eigen::Matrix<double, 2, 6>;
 using Mat23 = Eigen::Matrix<double, 2, 3>;
-
-struct Camera {
-  Mat3 rotation;
-  Vec3 translation;
-};
-
-std::vector<Camera> cameras_of(const std::vector<Rigid3>& poses) {
-  std::vector<Camera> cameras;
-  cameras.reserve(poses.size());
-  for (const Rigid3& pose : poses)
-    cameras.push_back({pose.rotation.toRotationMatrix(), pose.translation});
-  return cameras;
-}
-
-// Huber's rho(s) of the squared residual s, and its derivative.
-struct Loss {
-  double value, weight;
-};
-Loss huber(double s, double width) {
-  if (s <= width * width) return {s, 1.0};
-  const double root = std::sqrt(s);
-  return {2.0 * width * root - width * width, width / root};
-}
-
-double cost_of(const SchurProblem& problem, const std::vector<Camera>& cameras,
-               const std::vector<Vec3>& positions, const PointParts& parts) {
-  std::vector<double> sums(parts.count, 0.0);
-  parts.each([&](std::size_t part) {
-    double sum = 0.0;
-    for (std::size_t i = parts.begin(part); i < parts.begin(part + 1); ++i) {
-      for (const SchurProblem::Observation& o : problem.points[i].observations) {
-        const Camera& camera = cameras[o.camera];
-        const Vec3 p = camera.rotation * positions[i] + camera.translation;
-        if (!(p.z() > kMinDepth)) {
-          sums[part] = std::numeric_limits<double>::infinity();
-          return;
-        }
-        const Vec2 r = problem.focal_px * (p.head<2>() / p.z() - o.ray);
-        sum += huber(r.squaredNorm(), problem.huber_px).value;
-      }
-    }
-    sums[part] = sum;
-  });
-  double cost = 0.0;
-  for (const double sum : sums) cost += 0.5 * sum;
-  return cost;
-}
 
 // What the cameras' equations are summed from, in one part of the points.
 struct CameraSums {
@@ -139,7 +92,7 @@ class Solver {
     return slot;
   }
 
-  void linearise(const std::vector<Camera>& cameras);
+  void linearise(const std::vector<SchurCamera>& cameras);
   bool eliminate(double radius);
   bool solve_cameras(double radius, Eigen::VectorXd& step);
   void solve_points(const Eigen::VectorXd& camera_step, std::vector<Vec3>& step) const;
@@ -163,7 +116,7 @@ class Solver {
 
 // A camera's step (w, dt) turns R into exp([w]x) R and adds dt to t:
 //   dp/dw = -[R X]x,   dp/dt = I,   dp/dX = R,   dr/dp = f / p_z [1 0 -p_x/p_z; 0 1 -p_y/p_z].
-void Solver::linearise(const std::vector<Camera>& cameras) {
+void Solver::linearise(const std::vector<SchurCamera>& cameras) {
   parts_.each([&](std::size_t part) {
     CameraSums& sums = sums_[part];
     sums.clear();
@@ -174,7 +127,7 @@ void Solver::linearise(const std::vector<Camera>& cameras) {
       own.g.setZero();
       for (std::size_t j = 0; j < point.observations.size(); ++j) {
         const SchurProblem::Observation& o = point.observations[j];
-        const Camera& camera = cameras[o.camera];
+        const SchurCamera& camera = cameras[o.camera];
         const Vec3 turned = camera.rotation * point.position;
         const Vec3 p = turned + camera.translation;
         const double inverse_z = 1.0 / p.z(), x = p.x() * inverse_z, y = p.y() * inverse_z;
@@ -320,7 +273,7 @@ bool Solver::nothing_moves(const Eigen::VectorXd& camera_step,
 
 SchurReport Solver::run(const SchurOptions& options) {
   SchurReport report;
-  std::vector<Camera> cameras = cameras_of(problem_.cam_from_world);
+  std::vector<SchurCamera> cameras = cameras_of(problem_.cam_from_world);
   std::vector<Vec3> positions;
   for (const SchurProblem::Point& point : problem_.points) positions.push_back(point.position);
   double cost = cost_of(problem_, cameras, positions, parts_);
@@ -360,7 +313,7 @@ SchurReport Solver::run(const SchurOptions& options) {
     }
     std::vector<Vec3> next = positions;
     for (std::size_t i = 0; i < next.size(); ++i) next[i] += point_step[i];
-    const std::vector<Camera> next_cameras = cameras_of(poses);
+    const std::vector<SchurCamera> next_cameras = cameras_of(poses);
     const double next_cost = cost_of(problem_, next_cameras, next, parts_);
     if (!std::isfinite(next_cost)) {
       if (++refused >= kMaxRefusals) break;
