@@ -1,6 +1,7 @@
 #include "recon/dense/register_patch.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -17,7 +18,7 @@ constexpr int kTemplateSide = 2 * kTemplateHalfPx + 1;
 constexpr double kMinSearchScore = 0.6;
 
 PointRefinementOptions refinement_of(const Lens& lens) {
-  const double scale = lens.width / kReferenceWidthPx;
+  const double scale = std::min(lens.width, kFineWidthPx) / kReferenceWidthPx;
   PointRefinementOptions options;
   options.radius_px = kRadiusPx * scale;
   options.max_motion_px = kMaxMotionPx * scale;
@@ -84,8 +85,11 @@ std::optional<Vec2> PatchRegistrar::search(const WallPatch& patch, const PatchSi
 
 std::optional<Vec2> PatchRegistrar::settle(const WallPatch& patch, const PatchSight& sight,
                                            const PatchImage& image, const Vec2& start) const {
-  const auto pixel = refiner_(patch.fine, image.fine, patch.fine_px, start, sight.linear);
-  return pixel && usable_at(image.usable, *pixel) ? pixel : std::nullopt;
+  const auto place =
+      refiner_(patch.fine, image.fine, patch.fine_px, start / image.fine_shrink, sight.linear);
+  if (!place) return std::nullopt;
+  const Vec2 pixel = *place * image.fine_shrink;
+  return usable_at(image.usable, pixel) ? std::optional(pixel) : std::nullopt;
 }
 
 std::optional<Vec2> PatchRegistrar::find(const WallPatch& patch, const PatchSight& sight,

@@ -104,7 +104,8 @@ std::vector<WallPatch> patches_of(const PatchImage& image, const Lens& lens,
         world_from_cam.rotation * (z * Vec3::UnitX() - z * z * plane->x() * ray) / lens.fx;
     patch.along_y =
         world_from_cam.rotation * (z * Vec3::UnitY() - z * z * plane->y() * ray) / lens.fy;
-    if (!cut(image.fine, p.pixel, kFineHalfPx, patch.fine, patch.fine_px)) continue;
+    if (!cut(image.fine, p.pixel / image.fine_shrink, kFineHalfPx, patch.fine, patch.fine_px))
+      continue;
     if (!cut(image.coarse, p.pixel / image.shrink, kCoarseHalfPx, patch.coarse, patch.coarse_px))
       patch.coarse.release();  // near the border: followed, but not looked for
     patches.push_back(std::move(patch));
@@ -116,13 +117,22 @@ std::vector<WallPatch> patches_of(const PatchImage& image, const Lens& lens,
 
 PatchImage prepare_patch_image(const Frame& frame) {
   PatchImage image;
-  frame.gray.convertTo(image.fine, CV_32F, 1.0 / 255.0);
-  image.shrink = std::max(1.0, frame.gray.cols / static_cast<double>(kCoarseWidthPx));
-  const cv::Size size(static_cast<int>(std::lround(frame.gray.cols / image.shrink)),
-                      static_cast<int>(std::lround(frame.gray.rows / image.shrink)));
-  cv::Mat small, valid;
-  cv::resize(frame.gray, small, size, 0, 0, cv::INTER_AREA);
-  cv::resize(frame.valid, valid, size, 0, 0, cv::INTER_AREA);
+  const auto shrink_to = [&](int width_px) {
+    return std::max(1.0, frame.gray.cols / static_cast<double>(width_px));
+  };
+  const auto shrunk = [](const cv::Mat& picture, double shrink) {
+    if (shrink == 1.0) return picture;
+    cv::Mat small;
+    cv::resize(picture, small,
+               {static_cast<int>(std::lround(picture.cols / shrink)),
+                static_cast<int>(std::lround(picture.rows / shrink))},
+               0, 0, cv::INTER_AREA);
+    return small;
+  };
+  image.fine_shrink = shrink_to(kFineWidthPx);
+  shrunk(frame.gray, image.fine_shrink).convertTo(image.fine, CV_32F, 1.0 / 255.0);
+  image.shrink = shrink_to(kCoarseWidthPx);
+  const cv::Mat small = shrunk(frame.gray, image.shrink), valid = shrunk(frame.valid, image.shrink);
   image.coarse = even_light(small, valid == 255);
   image.usable = frame.valid & ~frame.reflection;
   return image;
