@@ -19,8 +19,8 @@ constexpr float kAmbient = 0.25f;
 // traversal (kSwell in render/raycaster.cpp), which would propose the same triangle again.
 constexpr double kStepPast = 1e-5;
 
-// Colour of one ray with its first hit, in sRGB.
-Vec3f look(const TriangleMesh& mesh, const Raycaster& raycaster, const Vec3& eye, const Vec3& ray,
+// The first hit of a ray that is not left out.
+Hit hit_of(const TriangleMesh& mesh, const Raycaster& raycaster, const Vec3& eye, const Vec3& ray,
            Hit hit, double step_past_mm, const ShadedViewOptions& options) {
   Vec3 from = eye;
   constexpr int kMostLayers = 64;
@@ -29,28 +29,43 @@ Vec3f look(const TriangleMesh& mesh, const Raycaster& raycaster, const Vec3& eye
     from += (hit.range_mm + step_past_mm) * ray;
     hit = raycaster.intersect(from, ray);
   }
-  if (!hit.met()) return options.background_srgb;
-  const Vec3i& t = mesh.triangles[hit.triangle];
-  const auto blend = [&](const std::vector<Vec3f>& values) -> Vec3f {
-    return (1.0f - hit.b1 - hit.b2) * values[t[0]] + hit.b1 * values[t[1]] + hit.b2 * values[t[2]];
-  };
+  return hit;
+}
+
+Vec3f blended(const std::vector<Vec3f>& values, const Vec3i& corners, const Hit& hit) {
+  return (1.0f - hit.b1 - hit.b2) * values[corners[0]] + hit.b1 * values[corners[1]] +
+         hit.b2 * values[corners[2]];
+}
+
+// Share of a colour that is left where a ray meets the mesh.
+float shade(const TriangleMesh& mesh, const Hit& hit, const Vec3& ray) {
   Vec3f normal = triangle_normal(mesh, hit.triangle).cast<float>();
-  if (!mesh.normals.empty()) normal = blend(mesh.normals).normalized();
+  if (!mesh.normals.empty())
+    normal = blended(mesh.normals, mesh.triangles[hit.triangle], hit).normalized();
   const float cosine = std::min(1.0f, std::abs(normal.dot(ray.cast<float>())));
-  const Vec3f colour = mesh.colors.empty() ? options.clay_srgb : blend(mesh.colors);
-  return colour * (kAmbient + (1.0f - kAmbient) * cosine);
+  return kAmbient + (1.0f - kAmbient) * cosine;
 }
 
 }  // namespace
 
-cv::Mat shaded_view(const TriangleMesh& mesh, const Rigid3& cam_from_world, const Lens& lens,
-                    const ShadedViewOptions& options) {
+std::vector<ColouredView> coloured_views(const TriangleMesh& mesh,
+                                         std::span<const std::vector<Vec3f>> colourings,
+                                         const Rigid3& cam_from_world, const Lens& lens,
+                                         const ShadedViewOptions& options) {
   check(options.samples >= 1, "shaded view: samples is {}, expected at least 1", options.samples);
+  for (const auto& colours : colourings)
+    check(colours.empty() || colours.size() == mesh.vertices.size(),
+          "shaded view: {} colours for {} vertices", colours.size(), mesh.vertices.size());
   const Raycaster raycaster(mesh);
   const LensProjector projector(lens);
   const Rigid3 world_from_cam = cam_from_world.inverse();
+  const Vec3& eye = world_from_cam.translation;
   const double step_past_mm = kStepPast * bounding_box(mesh).diagonal().norm();
-  cv::Mat picture(lens.height, lens.width, CV_8UC3);
+  std::vector<ColouredView> views(colourings.size());
+  for (ColouredView& view : views) {
+    view.bgr.create(lens.height, lens.width, CV_8UC3);
+    view.covered.create(lens.height, lens.width, CV_32F);
+  }
   const int per_pixel = options.samples * options.samples;
   tbb::parallel_for(0, lens.height, [&](int y) {
     std::vector<Vec3> rays;  // zero where the lens sees nothing
@@ -61,19 +76,41 @@ cv::Mat shaded_view(const TriangleMesh& mesh, const Rigid3& cam_from_world, cons
         rays.push_back(ray ? Vec3(world_from_cam.rotation * *ray) : Vec3::Zero());
       }
     std::vector<Hit> hits(rays.size());
-    raycaster.intersect(world_from_cam.translation, rays, hits);
-    for (int x = 0; x < lens.width; ++x) {
-      Vec3f sum = Vec3f::Zero();
-      for (int i = x * per_pixel; i < (x + 1) * per_pixel; ++i)
-        sum += look(mesh, raycaster, world_from_cam.translation, rays[i], hits[i], step_past_mm,
-                    options);
-      sum *= 255.0f / static_cast<float>(per_pixel);
-      for (int c = 0; c < 3; ++c)
-        picture.at<cv::Vec3b>(y, x)[2 - c] =
-            static_cast<unsigned char>(std::clamp(sum[c] + 0.5f, 0.0f, 255.0f));
+    std::vector<float> shades(rays.size());
+    raycaster.intersect(eye, rays, hits);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      hits[i] = hit_of(mesh, raycaster, eye, rays[i], hits[i], step_past_mm, options);
+      if (hits[i].met()) shades[i] = shade(mesh, hits[i], rays[i]);
     }
+    for (std::size_t k = 0; k < views.size(); ++k)
+      for (int x = 0; x < lens.width; ++x) {
+        Vec3f sum = Vec3f::Zero();
+        int met = 0;
+        for (int i = x * per_pixel; i < (x + 1) * per_pixel; ++i) {
+          const Hit& hit = hits[i];
+          if (!hit.met()) {
+            sum += options.background_srgb;
+            continue;
+          }
+          ++met;
+          const Vec3f colour = colourings[k].empty()
+                                   ? options.clay_srgb
+                                   : blended(colourings[k], mesh.triangles[hit.triangle], hit);
+          sum += colour * shades[i];
+        }
+        sum *= 255.0f / static_cast<float>(per_pixel);
+        for (int c = 0; c < 3; ++c)
+          views[k].bgr.at<cv::Vec3b>(y, x)[2 - c] =
+              static_cast<unsigned char>(std::clamp(sum[c] + 0.5f, 0.0f, 255.0f));
+        views[k].covered.at<float>(y, x) = static_cast<float>(met) / static_cast<float>(per_pixel);
+      }
   });
-  return picture;
+  return views;
+}
+
+cv::Mat shaded_view(const TriangleMesh& mesh, const Rigid3& cam_from_world, const Lens& lens,
+                    const ShadedViewOptions& options) {
+  return coloured_views(mesh, {&mesh.colors, 1}, cam_from_world, lens, options).front().bgr;
 }
 
 Lens picture_lens(int width, int height) {

@@ -2,6 +2,8 @@
 // A picture of a mesh for a page: what it looks like under a lamp at the camera.
 
 #include <opencv2/core/mat.hpp>
+#include <span>
+#include <vector>
 
 #include "cameras/camera.h"
 #include "core/mesh.h"
@@ -21,6 +23,19 @@ struct ShadedViewOptions {
 /// to the camera (no fall-off with distance). Smooth normals when the mesh has them.
 cv::Mat shaded_view(const TriangleMesh& mesh, const Rigid3& cam_from_world, const Lens& lens,
                     const ShadedViewOptions& options = {});
+
+/// One colouring of a mesh as a camera sees it.
+struct ColouredView {
+  cv::Mat bgr;      // as of shaded_view
+  cv::Mat covered;  // CV_32F: share of the pixel that is mesh, the rest being background
+};
+
+/// The same of several colourings of one mesh, which is traced once: each holds a colour a vertex,
+/// or none for clay. The mesh's own colours are not looked at.
+std::vector<ColouredView> coloured_views(const TriangleMesh& mesh,
+                                         std::span<const std::vector<Vec3f>> colourings,
+                                         const Rigid3& cam_from_world, const Lens& lens,
+                                         const ShadedViewOptions& options = {});
 
 /// A camera that sees the whole box from direction `from_world` (from the box's centre towards the
 /// eye), `up_world` up; the lens is a pinhole of 30 degrees.

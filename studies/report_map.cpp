@@ -17,50 +17,46 @@ namespace {
 constexpr int kWidth_px = 620, kHeight_px = 560;
 const Vec3f kSeen_srgb(0.86f, 0.55f, 0.47f), kUnseen_srgb(0.58f, 0.60f, 0.64f);
 
-TriangleMesh wall_with_seen_part(const TriangleMesh& wall, const Visibility& visibility) {
-  TriangleMesh coloured = wall;
-  coloured.colors.assign(wall.vertices.size(), kUnseen_srgb);
+using Colours = std::vector<Vec3f>;  // of a mesh's vertices
+
+Colours colours_of_seen(const TriangleMesh& wall, const Visibility& visibility) {
+  Colours colours(wall.vertices.size(), kUnseen_srgb);
   for (std::size_t t = 0; t < wall.triangles.size(); ++t)
     if (visibility.seen()[t] > 0)
-      for (const int v : wall.triangles[t]) coloured.colors[v] = kSeen_srgb;
-  if (coloured.normals.empty()) coloured.normals = angle_weighted_normals(coloured);
-  return coloured;
+      for (const int v : wall.triangles[t]) colours[v] = kSeen_srgb;
+  return colours;
 }
 
-TriangleMesh coloured_by_error(const TriangleMesh& map, const std::vector<double>& error_mm,
-                               double worst_mm) {
-  TriangleMesh coloured = map;
-  coloured.colors.resize(map.vertices.size());
-  for (std::size_t v = 0; v < map.vertices.size(); ++v)
-    coloured.colors[v] = error_colour(error_mm[v] / worst_mm);
-  if (coloured.normals.empty()) coloured.normals = angle_weighted_normals(coloured);
-  return coloured;
+Colours colours_of_errors(const std::vector<double>& error_mm, double worst_mm) {
+  Colours colours;
+  for (const double error : error_mm) colours.push_back(error_colour(error / worst_mm));
+  return colours;
 }
 
-cv::Mat view_into(const TriangleMesh& mesh, const Eigen::AlignedBox3d& box, const Side& side,
-                  float background) {
+std::vector<ColouredView> views_into(const TriangleMesh& mesh,
+                                     const std::vector<Colours>& colourings,
+                                     const Eigen::AlignedBox3d& box, const Side& side,
+                                     float background) {
   const Lens lens = picture_lens(kWidth_px, kHeight_px);
   ShadedViewOptions options;
   options.cull_front = true;  // the near side is left out: the eye looks into the organ
   options.background_srgb = Vec3f::Constant(background);
-  return shaded_view(mesh, view_of_box(box, side.from, side.up, lens), lens, options);
+  return coloured_views(mesh, colourings, view_of_box(box, side.from, side.up, lens), lens,
+                        options);
 }
 
-// The map over a pale wall. What lies before what does not matter: the map is always shown. Its
-// share a of a pixel follows from two backgrounds: a m + (1 - a) b on white less the same on black
-// is (1 - a) white.
-cv::Mat map_over_wall(const TriangleMesh& map, const cv::Mat& wall, const Eigen::AlignedBox3d& box,
-                      const Side& side) {
-  const cv::Mat on_white = view_into(map, box, side, 1.0f), on_black = view_into(map, box, side, 0);
+// The map, seen on black, over a pale wall. What lies before what does not matter: the map is
+// always shown.
+cv::Mat map_over_wall(const ColouredView& map, const cv::Mat& wall) {
   constexpr double kPale = 0.72;
   cv::Mat picture(wall.size(), CV_8UC3);
   for (int y = 0; y < wall.rows; ++y)
     for (int x = 0; x < wall.cols; ++x)
       for (int c = 0; c < 3; ++c) {
-        const double dark = on_black.at<cv::Vec3b>(y, x)[c];
-        const double open = (on_white.at<cv::Vec3b>(y, x)[c] - dark) / 255.0;
+        const double open = 1.0 - map.covered.at<float>(y, x);
         const double pale = 255.0 * kPale + (1.0 - kPale) * wall.at<cv::Vec3b>(y, x)[c];
-        picture.at<cv::Vec3b>(y, x)[c] = cv::saturate_cast<unsigned char>(dark + open * pale);
+        picture.at<cv::Vec3b>(y, x)[c] =
+            cv::saturate_cast<unsigned char>(map.bgr.at<cv::Vec3b>(y, x)[c] + open * pale);
       }
   return picture;
 }
@@ -73,28 +69,31 @@ std::string figure(const cv::Mat& image, const Side& side, const std::string& al
 }  // namespace
 
 std::string map_part(const CellView& view, const MapOverTruth& over) {
-  const TriangleMesh wall = wall_with_seen_part(view.truth.wall(), over.visibility);
+  TriangleMesh wall = view.truth.wall();
+  if (wall.normals.empty()) wall.normals = angle_weighted_normals(wall);
   const Eigen::AlignedBox3d box = bounding_box(wall);
   std::string out;
   const std::string note = view.cell.metrics.at("surface").at("note");
   if (!note.empty()) out += "<p class=\"note\">" + html::escape(note) + "</p>";
 
   const TriangleMesh& map = over.map;
-  TriangleMesh errors;
-  if (over.has_map()) errors = coloured_by_error(map, over.error_mm, over.worst_mm);
+  std::vector<Colours> wall_colours{colours_of_seen(wall, over.visibility)}, map_colours;
+  if (over.has_map()) {
+    wall_colours.emplace_back();  // clay
+    map_colours = {map.colors, colours_of_errors(over.error_mm, over.worst_mm)};
+  }
   out += fmt::format("<div class=\"maps\" style=\"--columns:{}\">", over.has_map() ? 3 : 1);
-  TriangleMesh clay = wall;
-  clay.colors.clear();
   for (const Side& side : two_sides()) {
-    out += figure(view_into(wall, box, side, 1.0f), side, "true wall",
+    const std::vector<ColouredView> walls = views_into(wall, wall_colours, box, side, 1.0f);
+    out += figure(walls[0].bgr, side, "true wall",
                   "The true wall, " + side.name +
                       ", looking in through the near side. Rose: seen by the capsule; gray: never "
                       "seen.");
     if (!over.has_map()) continue;
-    const cv::Mat shape = view_into(clay, box, side, 1.0f);
-    out += figure(map_over_wall(map, shape, box, side), side, "reconstructed map",
+    const std::vector<ColouredView> maps = views_into(map, map_colours, box, side, 0.0f);
+    out += figure(map_over_wall(maps[0], walls[1].bgr), side, "reconstructed map",
                   "The reconstructed map in its own colours, over the true wall (pale).");
-    out += figure(map_over_wall(errors, shape, box, side), side, "map coloured by error",
+    out += figure(map_over_wall(maps[1], walls[1].bgr), side, "map coloured by error",
                   "The map coloured by its distance to the wall that was seen.");
   }
   out += "</div>\n";

@@ -1,4 +1,3 @@
-#include <omp.h>
 #include <open3d/geometry/PointCloud.h>
 #include <open3d/pipelines/registration/Registration.h>
 #include <open3d/pipelines/registration/TransformationEstimation.h>
@@ -6,27 +5,10 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "core/one_thread.h"
 #include "validate/align.h"
 
 namespace rugae {
-namespace {
-
-// Open3D gathers its pairs in the order in which threads finish, so sums over them differ in the
-// last bits; with one thread they do not. The number of threads is a setting of the calling thread
-// alone (OpenMP 4.5, section 2.3.1), and is put back.
-class OneThread {
- public:
-  OneThread() : before_(omp_get_max_threads()) { omp_set_num_threads(1); }
-  ~OneThread() { omp_set_num_threads(before_); }
-  OneThread(const OneThread&) = delete;
-  OneThread& operator=(const OneThread&) = delete;
-
- private:
-  int before_;
-};
-
-}  // namespace
-
 void IcpOptions::check() const {
   rugae::check(max_distance_mm > 0.0, "icp: max_distance_mm is {}, expected above 0",
                max_distance_mm);
@@ -38,7 +20,9 @@ IcpResult icp(const std::vector<Vec3>& source, const std::vector<Vec3>& target,
   options.check();
   IcpResult result;
   if (source.size() < 3 || target.size() < 3) return result;
-  const OneThread one_thread;
+  // Open3D gathers its pairs in the order in which threads finish, so sums over them differ in the
+  // last bits; with one thread they do not.
+  const OneOpenMpThread one_thread;
   const open3d::geometry::PointCloud moving(source), fixed(target);
   namespace reg = open3d::pipelines::registration;
   constexpr double kStill = 1e-7;  // relative change of RMSE and fitness: far below any metric

@@ -38,6 +38,7 @@ class StudyKilled : public ::testing::Test {
     write_atomic(folder_ / "study.yaml",
                  "title: Killed\nresolution: coarse\nframes: 8\ncameras: [small.yaml]\n"
                  "trajectories: [short.yaml]\nseeds: [1, 2]\n"
+                 "details: false\nrecon: {pictures: false}\n"  // no pictures of what is compared
                  "axes: {recon.shading.iterations: [3, 5]}\n"
                  "tables: [{title: T, metric: trajectory.ate_sim3_rmse_mm, rows: seed}]\n"
                  "gates: [{metric: tracking.tracked_share, above: 0.5, reason: most of them}]\n");

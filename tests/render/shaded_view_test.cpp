@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
+
 #include "core/check.h"
 #include "tests/render/walls.h"
 
@@ -55,6 +57,42 @@ TEST(ShadedView, LooksIntoAClosedOrgan) {
   const Rigid3 pose = view_of_box(bounding_box(mesh), -Vec3::UnitY(), Vec3::UnitZ(), lens);
   EXPECT_GT(at(shaded_view(mesh, pose, lens), 30, 30)[2], 200);
   EXPECT_GT(at(shaded_view(mesh, pose, lens, {.cull_front = true}), 30, 30)[0], 200);
+}
+
+// Two colourings of one trace are those of two meshes, and what a pixel lets through of its
+// background is what covers it not.
+TEST(ShadedView, ColouringsAreThoseOfMeshesAndTheRestIsBackground) {
+  TriangleMesh mesh = test::sphere_mesh(3, 10.0);
+  std::vector<std::vector<Vec3f>> colourings(2);  // the second: clay
+  for (const Vec3& v : mesh.vertices)
+    colourings[0].emplace_back((0.05 * v + Vec3::Constant(0.5)).cast<float>());
+  const Lens lens = picture_lens(60, 50);
+  const Rigid3 pose = view_of_box(bounding_box(mesh), -Vec3::UnitY(), Vec3::UnitZ(), lens);
+  for (const bool cull_front : {false, true}) {
+    ShadedViewOptions options;
+    options.cull_front = cull_front;
+    options.background_srgb = Vec3f::Zero();
+    const auto views = coloured_views(mesh, colourings, pose, lens, options);
+    ASSERT_EQ(views.size(), 2u);
+    const double count = static_cast<double>(lens.width) * lens.height;
+    const double covered = cv::sum(views[0].covered)[0] / count;
+    EXPECT_GT(covered, 0.3);
+    EXPECT_LT(covered, 0.9);
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      mesh.colors = colourings[k];
+      options.background_srgb = Vec3f::Zero();
+      EXPECT_EQ(cv::norm(views[k].bgr, shaded_view(mesh, pose, lens, options), cv::NORM_INF), 0.0);
+      options.background_srgb = Vec3f::Ones();
+      const cv::Mat on_white = shaded_view(mesh, pose, lens, options);
+      for (int y = 0; y < lens.height; ++y)
+        for (int x = 0; x < lens.width; ++x)
+          EXPECT_NEAR(at(on_white, x, y)[0] - at(views[k].bgr, x, y)[0],
+                      255.0 * (1.0 - views[k].covered.at<float>(y, x)), 1.0)
+              << x << ' ' << y;
+    }
+  }
+  colourings[1].resize(3);
+  EXPECT_THROW(coloured_views(mesh, colourings, pose, lens), Error);
 }
 
 TEST(ShadedView, UpMustNotRunAlongTheView) {
