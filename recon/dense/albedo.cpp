@@ -1,0 +1,73 @@
+#include "recon/dense/albedo.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
+
+#include "core/check.h"
+#include "recon/dense/volume.h"
+
+namespace rugae {
+namespace {
+
+/// IEC 61966-2-1.
+double linear_from_srgb(double s) {
+  return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
+}
+double srgb_from_linear(double l) {
+  return l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1.0 / 2.4) - 0.055;
+}
+
+/// Incidence beyond this says more of the normal's error than of the wall: 75 degrees.
+constexpr float kMinCosine = 0.26f;
+/// At this level and above a pixel may be saturated.
+constexpr uchar kSaturated = 250;
+constexpr double kBrightShare = 0.98;  // of the values are below `kBrightLinear`
+constexpr double kBrightLinear = 0.8;
+
+}  // namespace
+
+cv::Mat albedo_of(const cv::Mat& bgr, const cv::Mat& known, const DepthMap& map) {
+  check(bgr.type() == CV_8UC3 && bgr.size() == map.depth.size() && known.type() == CV_8U &&
+            known.size() == bgr.size(),
+        "albedo_of: expected a CV_8UC3 picture and a CV_8U mask of the depth map's size");
+  std::array<float, 256> linear;
+  for (int level = 0; level < 256; ++level)
+    linear[level] = static_cast<float>(linear_from_srgb(level / 255.0));
+  const cv::Mat slant = slant_of(map);
+  cv::Mat albedo(bgr.size(), CV_32FC3,
+                 cv::Scalar::all(std::numeric_limits<float>::quiet_NaN()));
+  for (int y = 0; y < bgr.rows; ++y)
+    for (int x = 0; x < bgr.cols; ++x) {
+      const auto& pixel = bgr.at<cv::Vec3b>(y, x);
+      if (known.at<uchar>(y, x) == 0 || std::max({pixel[0], pixel[1], pixel[2]}) >= kSaturated)
+        continue;
+      const auto ray = static_cast<float>(map.grid.ray(x, y).norm());
+      const float cosine = slant.at<float>(y, x) / ray;
+      if (!(cosine >= kMinCosine)) continue;
+      const float distance = map.depth.at<float>(y, x) * ray;
+      const float gain = distance * distance / cosine;
+      albedo.at<cv::Vec3f>(y, x) = {gain * linear[pixel[2]], gain * linear[pixel[1]],
+                                    gain * linear[pixel[0]]};
+    }
+  return albedo;
+}
+
+void to_display(std::vector<Vec3f>& albedos) {
+  std::vector<float> values;
+  for (const Vec3f& albedo : albedos)
+    if (albedo.maxCoeff() > 0.0f) values.push_back(albedo.maxCoeff());
+  if (values.empty()) return;
+  const auto bright = values.begin() + static_cast<std::ptrdiff_t>(
+                                           kBrightShare * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), bright, values.end());
+  const double gain = kBrightLinear / *bright;
+  for (Vec3f& albedo : albedos)
+    for (int c = 0; c < 3; ++c)
+      albedo[c] =
+          static_cast<float>(srgb_from_linear(std::clamp(gain * albedo[c], 0.0, 1.0)));
+}
+
+}  // namespace rugae
