@@ -1,7 +1,6 @@
 #include "recon/dense/albedo.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
@@ -21,36 +20,35 @@ double srgb_from_linear(double l) {
 }
 
 /// Incidence beyond this says more of the normal's error than of the wall: 75 degrees.
-constexpr float kMinCosine = 0.26f;
+constexpr double kMinCosine = 0.26;
 /// At this level and above a pixel may be saturated.
-constexpr uchar kSaturated = 250;
+constexpr float kSaturated = 250.0f;
 constexpr double kBrightShare = 0.98;  // of the values are below `kBrightLinear`
 constexpr double kBrightLinear = 0.8;
 
 }  // namespace
 
-cv::Mat albedo_of(const cv::Mat& bgr, const cv::Mat& known, const DepthMap& map) {
-  check(bgr.type() == CV_8UC3 && bgr.size() == map.depth.size() && known.type() == CV_8U &&
-            known.size() == bgr.size(),
-        "albedo_of: expected a CV_8UC3 picture and a CV_8U mask of the depth map's size");
-  std::array<float, 256> linear;
-  for (int level = 0; level < 256; ++level)
-    linear[level] = static_cast<float>(linear_from_srgb(level / 255.0));
+cv::Mat albedo_of(const WideFrame& frame, const cv::Mat& gain, const DepthMap& map) {
+  check(frame.bgr.type() == CV_32FC3 && frame.bgr.size() == map.depth.size() &&
+            frame.known.size() == map.depth.size() && gain.size() == map.depth.size(),
+        "albedo_of: frame, gain and depth map are not of one size");
   const cv::Mat slant = slant_of(map);
-  cv::Mat albedo(bgr.size(), CV_32FC3,
+  cv::Mat albedo(map.depth.size(), CV_32FC3,
                  cv::Scalar::all(std::numeric_limits<float>::quiet_NaN()));
-  for (int y = 0; y < bgr.rows; ++y)
-    for (int x = 0; x < bgr.cols; ++x) {
-      const auto& pixel = bgr.at<cv::Vec3b>(y, x);
-      if (known.at<uchar>(y, x) == 0 || std::max({pixel[0], pixel[1], pixel[2]}) >= kSaturated)
+  for (int y = 0; y < albedo.rows; ++y)
+    for (int x = 0; x < albedo.cols; ++x) {
+      const auto& pixel = frame.bgr.at<cv::Vec3f>(y, x);
+      if (frame.known.at<uchar>(y, x) == 0 ||
+          std::max({pixel[0], pixel[1], pixel[2]}) >= kSaturated)
         continue;
-      const auto ray = static_cast<float>(map.grid.ray(x, y).norm());
-      const float cosine = slant.at<float>(y, x) / ray;
+      const double ray = map.grid.ray(x, y).norm();
+      const double cosine = slant.at<float>(y, x) / ray;
       if (!(cosine >= kMinCosine)) continue;
-      const float distance = map.depth.at<float>(y, x) * ray;
-      const float gain = distance * distance / cosine;
-      albedo.at<cv::Vec3f>(y, x) = {gain * linear[pixel[2]], gain * linear[pixel[1]],
-                                    gain * linear[pixel[0]]};
+      const double distance = map.depth.at<float>(y, x) * ray;
+      const double light = cosine / (distance * distance);
+      for (int c = 0; c < 3; ++c)
+        albedo.at<cv::Vec3f>(y, x)[c] = static_cast<float>(
+            linear_from_srgb(gain.at<float>(y, x) * pixel[2 - c] / 255.0) / light);
     }
   return albedo;
 }
@@ -66,8 +64,7 @@ void to_display(std::vector<Vec3f>& albedos) {
   const double gain = kBrightLinear / *bright;
   for (Vec3f& albedo : albedos)
     for (int c = 0; c < 3; ++c)
-      albedo[c] =
-          static_cast<float>(srgb_from_linear(std::clamp(gain * albedo[c], 0.0, 1.0)));
+      albedo[c] = static_cast<float>(srgb_from_linear(std::clamp(gain * albedo[c], 0.0, 1.0)));
 }
 
 }  // namespace rugae

@@ -11,10 +11,10 @@ namespace rugae {
 
 /// What a light at the camera's centre leaves of a frame's colours once its fall-off is undone:
 ///   albedo ~ L d^2 / cos(theta),
-/// L the linear brightness, d the distance, theta the incidence. `bgr`: CV_8UC3 on the map's grid,
-/// sRGB; `known`: CV_8U, 0 where a reflection was. CV_32FC3, linear RGB, in the square of the map's
-/// unit; NaN where there is no depth or no colour.
-cv::Mat albedo_of(const cv::Mat& bgr, const cv::Mat& known, const DepthMap& map);
+/// L the linear brightness, d the distance, theta the incidence. The frame is on the map's grid,
+/// its levels sRGB; `gain` (CV_32F) undoes its vignetting. CV_32FC3, linear RGB, in the square of
+/// the map's unit; NaN where there is no depth or no colour.
+cv::Mat albedo_of(const WideFrame& frame, const cv::Mat& gain, const DepthMap& map);
 
 /// Albedos times one gain, as sRGB in [0, 1]: how bright the light was nobody knows, so the
 /// brightest are made to fill the range.

@@ -11,8 +11,8 @@
 namespace rugae {
 namespace {
 
-constexpr int kOverlapStride = 16;     // pixels looked at, each way
-constexpr double kMinOverlap = 0.05;   // of the depths looked at
+constexpr int kOverlapStride = 16;    // pixels looked at, each way
+constexpr double kMinOverlap = 0.05;  // of the depths looked at
 /// Depths of one wall seen by two maps differ by less than this, whatever their sigma.
 constexpr double kOverlapShare = 0.1;
 

@@ -18,10 +18,10 @@
 namespace rugae {
 namespace {
 
-constexpr std::size_t kAtOnce = 8;       // depth maps between two steps of the progress line
-constexpr std::size_t kCachedViews = 48;  // frames as stereo sees them: 0.4 MB each
-constexpr int kComparedMaps = 12;        // others that a depth map is held against
-/// Agreeing pixels in smaller groups than this are chance, of a depth map 320 px wide.
+constexpr std::size_t kAtOnce = 8;        // depth maps between two steps of the progress line
+constexpr std::size_t kCachedViews = 48;  // frames as stereo sees them: 0.7 MB each
+constexpr int kComparedMaps = 12;         // others that a depth map is held against
+/// Agreeing pixels in smaller groups than this are chance, of a depth map 400 px wide.
 constexpr double kSmallestIslandPx = 60.0;
 /// Pieces with less than this share of the triangles of the largest piece are noise.
 constexpr double kSmallestPiece = 0.01;
@@ -29,27 +29,26 @@ constexpr double kSmallestPiece = 0.01;
 /// Frames as stereo sees them, the latest kept.
 class Views {
  public:
-  Views(const FrameSource& frames, const Structure& structure, const DenseOptions& options)
+  Views(const WideFrames& frames, const Structure& structure, const DenseOptions& options)
       : frames_(frames), structure_(structure), options_(options) {}
 
   std::shared_ptr<const StereoView> view(int keyframe) {
     return cache_.get(keyframe, [&] {
-      const Frame frame = frames_.pose_frame(structure_.frames[keyframe]);
-      return std::make_shared<const StereoView>(StereoView{
-          structure_.cam_from_world[keyframe],
-          stereo_levels(frame, frames_.lens(), options_.width_px, kStereoLevels,
-                        options_.window_radius_px)});
+      return std::make_shared<const StereoView>(
+          StereoView{structure_.cam_from_world[keyframe],
+                     stereo_levels(frames_.read(structure_.frames[keyframe]), frames_.grid(),
+                                   kStereoLevels, options_.window_radius_px)});
     });
   }
 
  private:
-  const FrameSource& frames_;
+  const WideFrames& frames_;
   const Structure& structure_;
   const DenseOptions& options_;
   Cache<std::shared_ptr<const StereoView>> cache_{kCachedViews};
 };
 
-std::vector<DepthMap> depth_maps(const FrameSource& frames, const Structure& structure,
+std::vector<DepthMap> depth_maps(const WideFrames& frames, const Structure& structure,
                                  const std::vector<StereoSet>& sets, const DenseOptions& options,
                                  Progress& progress) {
   progress.begin("stereo", sets.size());
@@ -83,7 +82,7 @@ void keep_consistent(std::vector<DepthMap>& maps, const DenseOptions& options) {
     for (const int j : overlapping[i]) others.push_back(&maps[j]);
     agreeing[i] = agreeing_maps(maps[i], others, options.consistent_sigmas);
   });
-  const double scale = options.width_px / 320.0;
+  const double scale = maps.front().grid.width / 400.0;
   const int smallest = static_cast<int>(kSmallestIslandPx * scale * scale);
   tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t i) {
     keep_agreed(maps[i], agreeing[i], options.consistent_maps, smallest);
@@ -97,21 +96,17 @@ double median(std::vector<float>& values) {
   return *middle;
 }
 
-DistanceVolume::Surface fuse(const FrameSource& frames, const Structure& structure,
+DistanceVolume::Surface fuse(const WideFrames& frames, const Structure& structure,
                              const std::vector<StereoSet>& sets, const std::vector<DepthMap>& maps,
                              double voxel, Progress& progress) {
   progress.begin("fusion", maps.size());
   DistanceVolume volume(voxel);
-  const Lens& lens = frames.lens();
   for (std::size_t begin = 0; begin < maps.size(); begin += kAtOnce) {
     const std::size_t end = std::min(maps.size(), begin + kAtOnce);
     std::vector<cv::Mat> colours(end - begin);
     tbb::parallel_for(begin, end, [&](std::size_t i) {
-      const Frame frame = frames.frame(structure.frames[sets[i].reference]);
-      cv::Mat bgr;
-      to_grid(frame.map_bgr, lens, maps[i].grid, false).convertTo(bgr, CV_8U);
-      colours[i - begin] = albedo_of(
-          bgr, to_grid(frame.valid & ~frame.reflection, lens, maps[i].grid, true), maps[i]);
+      colours[i - begin] = albedo_of(frames.read(structure.frames[sets[i].reference]),
+                                     frames.vignetting_gain(), maps[i]);
     });
     // One after another: a voxel's mean depends on the order in its last bits.
     for (std::size_t i = begin; i < end; ++i) volume.integrate(maps[i], colours[i - begin]);
@@ -123,12 +118,15 @@ DistanceVolume::Surface fuse(const FrameSource& frames, const Structure& structu
 }  // namespace
 
 DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
-                         const DenseOptions& options, Progress& progress) {
+                         const ReflectionOptions& reflections, const DenseOptions& options,
+                         Progress& progress) {
+  reflections.check();
   options.check();
   DenseMap result;
   const std::vector<StereoSet> sets = choose_views(structure, options);
   if (sets.empty()) return result;
-  std::vector<DepthMap> maps = depth_maps(frames, structure, sets, options, progress);
+  const WideFrames wide(frames, reflections, options.width_px);
+  std::vector<DepthMap> maps = depth_maps(wide, structure, sets, options, progress);
   progress.begin("consistency");
   keep_consistent(maps, options);
 
@@ -152,7 +150,7 @@ DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
   if (widths.empty()) return result;
 
   DistanceVolume::Surface surface =
-      fuse(frames, structure, sets, maps, options.voxel_px * median(widths), progress);
+      fuse(wide, structure, sets, maps, options.voxel_px * median(widths), progress);
   const std::vector<int> kept = vertices_of_large_pieces(surface.mesh, kSmallestPiece);
   for (const int v : kept) result.sigma.push_back(surface.sigma[v]);
   result.mesh = part_of(surface.mesh, kept);

@@ -22,10 +22,12 @@ struct DenseMap {
   double median_sigma = 0.0;  // of these depths, over the depth
 };
 
-/// Depth maps of chosen key frames, their consistency, fusion. Memory holds at most
-/// `max_depth_maps` small depth maps, a few frames and the surface. Empty where nothing was placed
-/// or seen from enough places; the same for any number of threads.
+/// Depth maps of chosen key frames, their consistency, fusion. `reflections`: how they are
+/// detected, to be left out. Memory holds at most `max_depth_maps` small depth maps, a few frames
+/// and the surface. Empty where nothing was placed or seen from enough places; the same for any
+/// number of threads.
 DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
-                         const DenseOptions& options, Progress& progress);
+                         const ReflectionOptions& reflections, const DenseOptions& options,
+                         Progress& progress);
 
 }  // namespace rugae

@@ -40,8 +40,8 @@ SweepRange range_for(const StereoImage& reference, const std::vector<SweepSource
   for (const SweepSource& source : sources)
     motions.push_back(motion_px(reference, source, surface));
   std::ranges::sort(motions);
-  const double fast = motions[static_cast<std::size_t>(
-      kFastShare * static_cast<double>(motions.size() - 1))];
+  const double fast =
+      motions[static_cast<std::size_t>(kFastShare * static_cast<double>(motions.size() - 1))];
   if (!(fast > 0.0)) return {};
   SweepRange range;
   range.step_ln = kStepPx / fast;
@@ -61,8 +61,7 @@ struct Label {
 /// for one source; of n sources the noise of the reference, half of it, stays: (1 + 1/n) / 2.
 Label label_of(const float* costs, const float* scores, int count, double window_px, int sources,
                double min_score) {
-  const int best =
-      static_cast<int>(std::min_element(costs, costs + count) - costs);
+  const int best = static_cast<int>(std::min_element(costs, costs + count) - costs);
   if (best == 0 || best == count - 1) return {};
   const float score = scores[best];
   if (!(score >= static_cast<float>(min_score))) return {};
@@ -89,8 +88,7 @@ Found search(const StereoView& reference, const std::vector<const StereoView*>& 
   const SweepRange range = range_for(image, sweep_sources, surface, reach_ln);
   if (range.reach == 0) return found;
   found.step_ln = range.step_ln;
-  const ScoreVolume scores =
-      sweep(image, sweep_sources, surface, range, options.window_radius_px);
+  const ScoreVolume scores = sweep(image, sweep_sources, surface, range, options.window_radius_px);
   const ScoreVolume costs = path_costs(scores, kSmoothness);
   const double side = 2.0 * options.window_radius_px + 1.0;
   const int counted = std::max<int>(2, (static_cast<int>(sources.size()) + 1) / 2);

@@ -38,8 +38,8 @@ float step(const float* cost, const float* before, float before_min, int count,
   float least = 1e9f;
   for (int k = 0; k < count; ++k) {
     const float beside = std::min(before[k], before[k + 2]) + s.one;
-    const float value = cost[k] + std::min(std::min(before[k + 1], beside), before_min + s.more) -
-                        before_min;
+    const float value =
+        cost[k] + std::min(std::min(before[k + 1], beside), before_min + s.more) - before_min;
     now[k + 1] = value;
     least = std::min(least, value);
   }

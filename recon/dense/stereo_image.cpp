@@ -1,13 +1,10 @@
 #include "recon/dense/stereo_image.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/check.h"
-#include "recon/pinhole.h"
 
 namespace rugae {
 namespace {
@@ -17,7 +14,6 @@ namespace {
 constexpr double kMeanRadii = 2.0;
 /// Grey levels below this carry more noise than wall.
 constexpr float kDarkest = 8.0f;
-constexpr double kWhole = 254.5;  // of a mask averaged over a pixel's area
 
 /// Brightness over its local mean, over known pixels only, minus one.
 cv::Mat relative_brightness(const cv::Mat& gray, const cv::Mat& known, double sigma_px) {
@@ -37,53 +33,34 @@ cv::Mat relative_brightness(const cv::Mat& gray, const cv::Mat& known, double si
   return texture;
 }
 
+/// Half as many pixels each way, an odd last row or column repeated; a mask holds where all of a
+/// pixel's four do.
+cv::Mat halved_picture(const cv::Mat& picture, const PinholeGrid& half, bool mask) {
+  cv::Mat even, small;
+  cv::copyMakeBorder(picture, even, 0, 2 * half.height - picture.rows, 0,
+                     2 * half.width - picture.cols, cv::BORDER_REPLICATE);
+  cv::resize(even, small, half.size(), 0.0, 0.0, cv::INTER_AREA);
+  return mask ? cv::Mat(small == 255) : small;
+}
+
 }  // namespace
 
-PinholeGrid grid_of(const Lens& lens, int width_px) {
-  PinholeGrid grid;
-  grid.width = std::min(width_px, lens.width);
-  grid.height = std::max(
-      1, static_cast<int>(std::lround(static_cast<double>(lens.height) * grid.width / lens.width)));
-  const double across = static_cast<double>(grid.width) / lens.width;
-  const double down = static_cast<double>(grid.height) / lens.height;
-  grid.fx = across * lens.fx;
-  grid.cx = across * lens.cx;
-  grid.fy = down * lens.fy;
-  grid.cy = down * lens.cy;
-  return grid;
-}
-
-cv::Mat to_grid(const cv::Mat& picture, const Lens& lens, const PinholeGrid& grid, bool mask) {
-  cv::Mat straight = picture;
-  if (!is_pinhole(lens)) {
-    const LensProjector projector(lens);
-    const PinholeGrid whole = grid_of(lens, lens.width);
-    cv::Mat source(picture.size(), CV_32FC2, cv::Scalar::all(-1.0));
-    for (int y = 0; y < source.rows; ++y)
-      for (int x = 0; x < source.cols; ++x)
-        if (const auto pixel = projector.project(whole.ray(x, y)))
-          source.at<cv::Vec2f>(y, x) = {static_cast<float>(pixel->x() - 0.5),
-                                        static_cast<float>(pixel->y() - 0.5)};
-    cv::remap(picture, straight, source, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
-  }
-  cv::Mat wide, small;
-  straight.convertTo(wide, CV_32F);
-  cv::resize(wide, small, grid.size(), 0.0, 0.0, cv::INTER_AREA);
-  return mask ? cv::Mat(small > kWhole) : small;
-}
-
-std::vector<StereoImage> stereo_levels(const Frame& frame, const Lens& lens, int width_px,
-                                       int levels, int radius_px) {
-  check(frame.gray.type() == CV_8U && frame.reflection.size() == frame.gray.size() &&
-            frame.valid.size() == frame.gray.size(),
-        "stereo_levels: frame {} has no grey picture with its masks", frame.index);
-  const cv::Mat known = frame.valid & ~frame.reflection;
+std::vector<StereoImage> stereo_levels(const WideFrame& frame, const PinholeGrid& grid, int levels,
+                                       int radius_px) {
+  check(frame.bgr.type() == CV_32FC3 && frame.known.type() == CV_8U &&
+            frame.bgr.size() == grid.size() && frame.known.size() == grid.size(),
+        "stereo_levels: expected a CV_32FC3 picture and a CV_8U mask of the grid's size");
+  cv::Mat gray, known = frame.known;
+  cv::cvtColor(frame.bgr, gray, cv::COLOR_BGR2GRAY);
   std::vector<StereoImage> images;
+  PinholeGrid level_grid = grid;
   for (int level = 0; level < levels; ++level) {
-    const PinholeGrid grid = grid_of(lens, std::max(8, std::min(width_px, lens.width) >> level));
-    images.push_back({grid, relative_brightness(to_grid(frame.gray, lens, grid, false),
-                                                to_grid(known, lens, grid, true),
-                                                kMeanRadii * radius_px)});
+    if (level > 0) {
+      level_grid = halved(level_grid);
+      gray = halved_picture(gray, level_grid, false);
+      known = halved_picture(known, level_grid, true);
+    }
+    images.push_back({level_grid, relative_brightness(gray, known, kMeanRadii * radius_px)});
   }
   return images;
 }

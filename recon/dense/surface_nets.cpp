@@ -39,8 +39,8 @@ class SurfaceNets {
   }
   static std::size_t within(const Vec3i& v) {
     constexpr int kMask = kSide - 1;
-    return static_cast<std::size_t>(
-        ((v.z() & kMask) * kSide + (v.y() & kMask)) * kSide + (v.x() & kMask));
+    return static_cast<std::size_t>(((v.z() & kMask) * kSide + (v.y() & kMask)) * kSide +
+                                    (v.x() & kMask));
   }
 
   /// The voxel, or nothing where no depth map has told its distance.

@@ -45,17 +45,19 @@ void warp_row(const Warp& warp, const cv::Mat& texture, const float* surface, fl
   const float row = static_cast<float>(y) + 0.5f;
   for (int x = 0; x < width; ++x) {
     const float column = static_cast<float>(x) + 0.5f, z = surface[x] * factor;
-    const float w =
-        z * (warp.m[2][0] * column + warp.m[2][1] * row + warp.m[2][2]) + warp.b[2];
+    const float w = z * (warp.m[2][0] * column + warp.m[2][1] * row + warp.m[2][2]) + warp.b[2];
     const float inverse = 1.0f / w;
     // Behind the source: outside its picture.
-    u[x] = w > 0.0f ? (z * (warp.m[0][0] * column + warp.m[0][1] * row + warp.m[0][2]) +
-                       warp.b[0]) * inverse - 0.5f
-                    : -1.0f;
+    u[x] = w > 0.0f
+               ? (z * (warp.m[0][0] * column + warp.m[0][1] * row + warp.m[0][2]) + warp.b[0]) *
+                         inverse -
+                     0.5f
+               : -1.0f;
     v[x] = (z * (warp.m[1][0] * column + warp.m[1][1] * row + warp.m[1][2]) + warp.b[1]) * inverse -
            0.5f;
   }
-  const float right = static_cast<float>(texture.cols - 1), low = static_cast<float>(texture.rows - 1);
+  const float right = static_cast<float>(texture.cols - 1),
+              low = static_cast<float>(texture.rows - 1);
   const std::size_t stride = texture.step1();
   const float* data = texture.ptr<float>();
   for (int x = 0; x < width; ++x) {
@@ -194,8 +196,7 @@ ScoreVolume sweep(const StereoImage& reference, const std::vector<SweepSource>& 
   std::vector<Warp> warps;
   std::vector<cv::Mat> scores;
   for (const SweepSource& source : sources) {
-    warps.push_back(
-        warp_between(reference.grid, source.image->grid, source.source_from_reference));
+    warps.push_back(warp_between(reference.grid, source.image->grid, source.source_from_reference));
     scores.emplace_back(volume.size, CV_32F);
   }
   cv::Mat warped(volume.size, CV_32F);

@@ -55,8 +55,8 @@ std::vector<int> sources_of(int reference, const std::vector<std::vector<Seen>>&
       if (other == reference) continue;
       const Seen& theirs = seen[other][place];
       const double cosine = std::clamp(mine[i].towards_cam.dot(theirs.towards_cam), -1.0, 1.0);
-      const double scale = std::min(mine[i].distance, theirs.distance) /
-                           std::max(mine[i].distance, theirs.distance);
+      const double scale =
+          std::min(mine[i].distance, theirs.distance) / std::max(mine[i].distance, theirs.distance);
       worth[other].emplace_back(static_cast<int>(i),
                                 scale * triangulation_weight(std::acos(cosine)));
     }

@@ -44,8 +44,8 @@ cv::Mat slant_of(const DepthMap& map) {
   for (int y = 0; y < map.grid.height; ++y)
     for (int x = 0; x < map.grid.width; ++x) {
       if (!(map.depth.at<float>(y, x) > 0.0f)) continue;
-      const Vec3 normal = difference(map, x, y, kNormalReachPx, 0)
-                              .cross(difference(map, x, y, 0, kNormalReachPx));
+      const Vec3 normal =
+          difference(map, x, y, kNormalReachPx, 0).cross(difference(map, x, y, 0, kNormalReachPx));
       const double length = normal.norm();
       if (length > 0.0)
         slant.at<float>(y, x) =
@@ -179,8 +179,7 @@ void DistanceVolume::update(const View& view, std::uint64_t key, Block& block) c
 
 void DistanceVolume::integrate(const DepthMap& map, const cv::Mat& colours) {
   check(map.depth.size() == map.grid.size() && map.sigma.size() == map.depth.size() &&
-            (colours.empty() ||
-             (colours.size() == map.depth.size() && colours.type() == CV_32FC3)),
+            (colours.empty() || (colours.size() == map.depth.size() && colours.type() == CV_32FC3)),
         "DistanceVolume: depth, sigma and colours are not of one size");
   const View view(map, colours, voxel_);
   const std::vector<std::uint64_t> keys = touched_blocks(view);
