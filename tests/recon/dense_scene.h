@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <vector>
 

@@ -6,9 +6,9 @@
 
 #include "core/check.h"
 #include "core/units.h"
-#include "message_of.h"
 #include "recon/dense/pinhole_grid.h"
 #include "recon/dense/view_choice.h"
+#include "tests/message_of.h"
 
 namespace rugae {
 namespace {
