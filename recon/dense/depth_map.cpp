@@ -65,13 +65,14 @@ Label label_of(const float* costs, const float* scores, int count, double window
   if (best == 0 || best == count - 1) return {};
   const float score = scores[best];
   if (!(score >= static_cast<float>(min_score))) return {};
-  const float below = costs[best - 1], above = costs[best + 1];
-  const float bend = below + above - 2.0f * costs[best];
-  const float score_bend = 2.0f * score - scores[best - 1] - scores[best + 1];
-  if (!(bend > 0.0f) || !(score_bend > 0.0f)) return {};
+  // The top of the correlation itself where the paths lead to it: their costs change by steps,
+  // which would draw the place towards whole labels.
+  const float bend = 2.0f * score - scores[best - 1] - scores[best + 1];
+  const float slope = scores[best + 1] - scores[best - 1];
+  if (!(bend > 0.0f) || !(std::abs(slope) <= 2.0f * bend)) return {};
   Label label;
-  label.place = static_cast<float>(best) + 0.5f * (below - above) / bend;
-  const double variance = (1.0 - score) * (1.0 + 1.0 / sources) / (window_px * score_bend);
+  label.place = static_cast<float>(best) + 0.5f * slope / bend;
+  const double variance = (1.0 - score) * (1.0 + 1.0 / sources) / (window_px * bend);
   label.sigma = static_cast<float>(std::sqrt(variance + kSystematicSteps * kSystematicSteps));
   return label;
 }

@@ -111,14 +111,14 @@ TEST(DenseDepth, InsideOfASphere) {
   EXPECT_GE(errors.within_three, 0.99);
 }
 
-// Noise of the texture's own size over three.
+// The texture's standard deviation is 1.5 levels, the noise 1: a tenth of a pixel.
 TEST(DenseDepth, SigmaCoversTheErrorOfNoise) {
   Setting setting;
   setting.contrast = 0.05;
   setting.noise_levels = 1.0;
   const Errors errors = errors_of(estimate(setting));
   EXPECT_GE(errors.known_share, 0.8);
-  EXPECT_LE(errors.median, kTwentiethOfAPixel);
+  EXPECT_LE(errors.median, 2.0 * kTwentiethOfAPixel);
   EXPECT_GE(errors.within_three, 0.97);
   // And says something: the median of a normal distribution's absolute values is 0.67 sigma, which
   // is not missed by more than a factor of three.
@@ -133,20 +133,23 @@ TEST(DenseDepth, MoreNoiseMeansMoreSigma) {
   EXPECT_GE(errors_of(estimate(loud)).median_sigma, 1.5 * errors_of(estimate(quiet)).median_sigma);
 }
 
+// Some windows are alike by chance; that is for other depth maps to tell.
+constexpr double kChance = 0.05;
+
 TEST(DenseDepth, AWallWithoutTextureStaysUnknown) {
   Setting setting;
   setting.contrast = 0.0;
   setting.noise_levels = 1.0;
-  EXPECT_LE(errors_of(estimate(setting)).known_share, 0.02);
+  EXPECT_LE(errors_of(estimate(setting)).known_share, kChance);
   setting.noise_levels = 0.0;
-  EXPECT_LE(errors_of(estimate(setting)).known_share, 0.02);
+  EXPECT_LE(errors_of(estimate(setting)).known_share, kChance);
 }
 
 // Six degrees are 8 px: no window finds its like.
 TEST(DenseDepth, WrongPosesFindLittle) {
   Setting setting;
   setting.wrong_rad = 6.0 * kPi / 180.0;
-  EXPECT_LE(errors_of(estimate(setting)).known_share, 0.1);
+  EXPECT_LE(errors_of(estimate(setting)).known_share, kChance);
 }
 
 TEST(DenseDepth, FewSourcesOrNoPriorFindNothing) {
@@ -241,7 +244,7 @@ TEST(DenseDepth, PriorFollowsItsPoints) {
   EXPECT_GE(prior.reach_ln, 0.1);
   for (int y = 0; y < grid.height; ++y)
     for (int x = 0; x < grid.width; ++x)
-      ASSERT_NEAR(prior.depth.at<float>(y, x), truth.at<float>(y, x), 0.01 * kDistance);
+      ASSERT_NEAR(prior.depth.at<float>(y, x), truth.at<float>(y, x), 0.01 * truth.at<float>(y, x));
   EXPECT_TRUE(depth_prior(structure, 1, grid).depth.empty());  // sees none of the points
 }
 
