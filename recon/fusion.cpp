@@ -16,6 +16,7 @@
 #include "core/check.h"
 #include "core/one_thread.h"
 #include "recon/map.h"
+#include "recon/mesh_pieces.h"
 #include "recon/pinhole.h"
 
 namespace rugae {
@@ -121,34 +122,6 @@ open3d::geometry::RGBDImage rgbd_of(const View& view) {
   return image;
 }
 
-/// Leaves out small pieces and the vertices nobody uses; keeps the order of the rest.
-TriangleMesh without_small_pieces(const TriangleMesh& mesh) {
-  const auto pieces = connected_components(mesh);
-  if (pieces.empty()) return {};
-  const double smallest = kSmallestPiece * static_cast<double>(pieces.front().size());
-  std::vector<bool> keep(mesh.triangles.size(), false);
-  for (const auto& piece : pieces)
-    if (static_cast<double>(piece.size()) >= smallest)
-      for (const int t : piece) keep[t] = true;
-  std::vector<int> renumbered(mesh.vertices.size(), -1);
-  TriangleMesh kept;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (!keep[t]) continue;
-    Vec3i corners;
-    for (int c = 0; c < 3; ++c) {
-      int& vertex = renumbered[mesh.triangles[t][c]];
-      if (vertex < 0) {
-        vertex = static_cast<int>(kept.vertices.size());
-        kept.vertices.push_back(mesh.vertices[mesh.triangles[t][c]]);
-        kept.colors.push_back(mesh.colors[mesh.triangles[t][c]]);
-      }
-      corners[c] = vertex;
-    }
-    kept.triangles.push_back(corners);
-  }
-  return kept;
-}
-
 }  // namespace
 
 TriangleMesh fuse_map(const std::vector<Mosaic>& mosaics,
@@ -193,7 +166,7 @@ TriangleMesh fuse_map(const std::vector<Mosaic>& mosaics,
     mesh.colors.push_back((color.cwiseMin(1.0).cwiseMax(0.0)).cast<float>());
   // Marching cubes winds towards the cameras; our normals point out of the lumen.
   for (const Vec3i& t : fused->triangles_) mesh.triangles.emplace_back(t[0], t[2], t[1]);
-  mesh = without_small_pieces(mesh);
+  mesh = part_of(mesh, vertices_of_large_pieces(mesh, kSmallestPiece));
   mesh.normals = angle_weighted_normals(mesh);
   return mesh;
 }

@@ -1,0 +1,163 @@
+#include "recon/dense/dense_map.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "recon/cache.h"
+#include "recon/dense/albedo.h"
+#include "recon/dense/consistency.h"
+#include "recon/dense/depth_map.h"
+#include "recon/dense/view_choice.h"
+#include "recon/dense/volume.h"
+#include "recon/mesh_pieces.h"
+
+namespace rugae {
+namespace {
+
+constexpr std::size_t kAtOnce = 8;        // depth maps between two steps of the progress line
+constexpr std::size_t kCachedViews = 48;  // frames as stereo sees them: 0.7 MB each
+constexpr int kComparedMaps = 12;         // others that a depth map is held against
+/// Agreeing pixels in smaller groups than this are chance, of a depth map 400 px wide.
+constexpr double kSmallestIslandPx = 60.0;
+/// Pieces with less than this share of the triangles of the largest piece are noise.
+constexpr double kSmallestPiece = 0.01;
+
+/// Frames as stereo sees them, the latest kept.
+class Views {
+ public:
+  Views(const WideFrames& frames, const Structure& structure, const DenseOptions& options)
+      : frames_(frames), structure_(structure), options_(options) {}
+
+  std::shared_ptr<const StereoView> view(int keyframe) {
+    return cache_.get(keyframe, [&] {
+      return std::make_shared<const StereoView>(
+          StereoView{structure_.cam_from_world[keyframe],
+                     stereo_levels(frames_.read(structure_.frames[keyframe]), frames_.grid(),
+                                   kStereoLevels, options_.window_radius_px)});
+    });
+  }
+
+ private:
+  const WideFrames& frames_;
+  const Structure& structure_;
+  const DenseOptions& options_;
+  Cache<std::shared_ptr<const StereoView>> cache_{kCachedViews};
+};
+
+std::vector<DepthMap> depth_maps(const WideFrames& frames, const Structure& structure,
+                                 const std::vector<StereoSet>& sets, const DenseOptions& options,
+                                 Progress& progress) {
+  progress.begin("stereo", sets.size());
+  Views views(frames, structure, options);
+  std::vector<DepthMap> maps(sets.size());
+  for (std::size_t begin = 0; begin < sets.size(); begin += kAtOnce) {
+    const std::size_t end = std::min(sets.size(), begin + kAtOnce);
+    tbb::parallel_for(begin, end, [&](std::size_t i) {
+      const auto reference = views.view(sets[i].reference);
+      std::vector<std::shared_ptr<const StereoView>> held;
+      std::vector<const StereoView*> sources;
+      for (const int source : sets[i].sources) {
+        held.push_back(views.view(source));
+        sources.push_back(held.back().get());
+      }
+      const DepthPrior prior =
+          depth_prior(structure, sets[i].reference, reference->levels.back().grid);
+      maps[i] = estimate_depth(*reference, sources, prior, options);
+    });
+    progress.step(end - begin);
+  }
+  return maps;
+}
+
+/// Leaves of each depth map what others agree with; all are compared as they were found.
+void keep_consistent(std::vector<DepthMap>& maps, const DenseOptions& options) {
+  const auto overlapping = overlapping_maps(maps, kComparedMaps);
+  std::vector<cv::Mat> agreeing(maps.size());
+  tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t i) {
+    std::vector<const DepthMap*> others;
+    for (const int j : overlapping[i]) others.push_back(&maps[j]);
+    agreeing[i] = agreeing_maps(maps[i], others, options.consistent_sigmas);
+  });
+  const double scale = maps.front().grid.width / 400.0;
+  const int smallest = static_cast<int>(kSmallestIslandPx * scale * scale);
+  tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t i) {
+    keep_agreed(maps[i], agreeing[i], options.consistent_maps, smallest);
+  });
+}
+
+double median(std::vector<float>& values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+DistanceVolume::Surface fuse(const WideFrames& frames, const Structure& structure,
+                             const std::vector<StereoSet>& sets, const std::vector<DepthMap>& maps,
+                             double voxel, Progress& progress) {
+  progress.begin("fusion", maps.size());
+  DistanceVolume volume(voxel);
+  for (std::size_t begin = 0; begin < maps.size(); begin += kAtOnce) {
+    const std::size_t end = std::min(maps.size(), begin + kAtOnce);
+    std::vector<cv::Mat> colours(end - begin);
+    tbb::parallel_for(begin, end, [&](std::size_t i) {
+      colours[i - begin] = albedo_of(frames.read(structure.frames[sets[i].reference]),
+                                     frames.vignetting_gain(), maps[i]);
+    });
+    // One after another: a voxel's mean depends on the order in its last bits.
+    for (std::size_t i = begin; i < end; ++i) volume.integrate(maps[i], colours[i - begin]);
+    progress.step(end - begin);
+  }
+  return volume.extract();
+}
+
+}  // namespace
+
+DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
+                         const ReflectionOptions& reflections, const DenseOptions& options,
+                         Progress& progress) {
+  reflections.check();
+  options.check();
+  DenseMap result;
+  const std::vector<StereoSet> sets = choose_views(structure, options);
+  if (sets.empty()) return result;
+  const WideFrames wide(frames, reflections, options.width_px);
+  std::vector<DepthMap> maps = depth_maps(wide, structure, sets, options, progress);
+  progress.begin("consistency");
+  keep_consistent(maps, options);
+
+  std::vector<float> widths, sigmas;  // of a pixel on the wall; over the depth
+  std::size_t pixels = 0;
+  for (const DepthMap& map : maps) {
+    pixels += map.depth.total();
+    for (int y = 0; y < map.grid.height; ++y)
+      for (int x = 0; x < map.grid.width; ++x) {
+        const float z = map.depth.at<float>(y, x);
+        if (!(z > 0.0f)) continue;
+        widths.push_back(z / static_cast<float>(map.grid.fx));
+        sigmas.push_back(map.sigma.at<float>(y, x) / z);
+      }
+  }
+  result.depth_maps = static_cast<int>(maps.size());
+  result.depth_share = static_cast<double>(sigmas.size()) / static_cast<double>(pixels);
+  result.median_sigma = median(sigmas);
+  progress.end(fmt::format("{:.0f} % of {} depth maps, sigma {:.2g} of the depth",
+                           100.0 * result.depth_share, maps.size(), result.median_sigma));
+  if (widths.empty()) return result;
+
+  DistanceVolume::Surface surface =
+      fuse(wide, structure, sets, maps, options.voxel_px * median(widths), progress);
+  const std::vector<int> kept = vertices_of_large_pieces(surface.mesh, kSmallestPiece);
+  for (const int v : kept) result.sigma.push_back(surface.sigma[v]);
+  result.mesh = part_of(surface.mesh, kept);
+  to_display(result.mesh.colors);
+  result.mesh.normals = angle_weighted_normals(result.mesh);
+  progress.end(fmt::format("{} triangles", result.mesh.triangles.size()));
+  return result;
+}
+
+}  // namespace rugae
