@@ -58,6 +58,8 @@ ReconOptions motion_options(ReconOptions options) {
   options.mosaic = defaults.mosaic;
   options.shading = defaults.shading;
   options.map = defaults.map;
+  options.dense = defaults.dense;
+  if (options.method != "dense") options.revisits = defaults.revisits;
   options.pictures = defaults.pictures;
   return options;
 }

@@ -80,6 +80,7 @@ void fields(Visitor& v, MapOptions& o) {
 
 template <typename Visitor>
 void fields(Visitor& v, RevisitOptions& o) {
+  v.number("neighbours", o.neighbours, 1, 100);
   v.number("rounds", o.rounds, 0, 100);
   v.number("search_px", o.search_px, 0.0, 1000.0);
 }
@@ -96,6 +97,7 @@ void fields(Visitor& v, ReconOptions& o) {
   v.section("shading", o.shading);
   v.section("map", o.map);
   v.section("revisits", o.revisits);
+  v.section("dense", o.dense);
   v.flag("pictures", o.pictures);
   v.seed("seed", o.seed);
 }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/yaml.h"
+#include "recon/dense/dense_options.h"
 
 namespace rugae {
 
@@ -76,6 +77,7 @@ struct MapOptions {
 
 /// Of `dense`: wall seen again.
 struct RevisitOptions {
+  int neighbours = 1;       // in place of AlignOptions': what is seen again ties further apart
   int rounds = 2;           // of looking for it and adjusting all; 0: none
   double search_px = 24.0;  // around where a point should be seen, at 640 px width
   void check() const;
@@ -92,6 +94,7 @@ struct ReconOptions {
   ShadingOptions shading;
   MapOptions map;
   RevisitOptions revisits;
+  DenseOptions dense;
   bool pictures = true;  // intermediates for people
   std::uint64_t seed = 1;
   void check() const;

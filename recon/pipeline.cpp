@@ -9,6 +9,7 @@
 #include "core/check.h"
 #include "core/files.h"
 #include "dataset/image_io.h"
+#include "recon/dense/dense_map.h"
 #include "recon/map.h"
 #include "recon/mosaic.h"
 #include "recon/pictures.h"
@@ -57,6 +58,13 @@ void write_depth(const EstimateLayout& layout, const TriangleMesh& map, const St
   progress.end();
 }
 
+void add(DenseMap map, Estimate& estimate) {
+  estimate.map = std::move(map.mesh);
+  estimate.numbers["depth_maps"] = map.depth_maps;
+  estimate.numbers["depth_share"] = map.depth_share;
+  estimate.numbers["median_sigma_over_depth"] = map.median_sigma;
+}
+
 // What a reader of estimate.json wants to know of the run.
 Estimate estimate_of(const Observations& observations, const ReconOptions& options,
                      const Motion& motion) {
@@ -102,12 +110,19 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
   const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());  // of the caller
   const Structure& structure = motion.structure;
 
-  progress.begin("mosaics");  // algorithm 3, steps 8 to 10
-  const auto mosaics = compose_mosaics(frames, structure, motion.pairs, options.mosaic);
-  const auto depths = place_all(mosaics, structure, frames.lens(), options, stages, progress);
-  progress.begin("map");
   Estimate estimate = estimate_of(frames.observations(), options, motion);
-  estimate.map = fuse_map(mosaics, depths, structure, frames.lens(), options.map);
+  std::vector<Mosaic> mosaics;
+  std::vector<std::optional<MosaicDepth>> depths;
+  if (options.method == "dense") {
+    add(build_dense_map(frames, structure, options.preprocess.reflections, options.dense, progress),
+        estimate);
+  } else {
+    progress.begin("mosaics");  // algorithm 3, steps 8 to 10
+    mosaics = compose_mosaics(frames, structure, motion.pairs, options.mosaic);
+    depths = place_all(mosaics, structure, frames.lens(), options, stages, progress);
+    progress.begin("map");
+    estimate.map = fuse_map(mosaics, depths, structure, frames.lens(), options.map);
+  }
   write_depth(layout, estimate.map, structure, frames.observations().lens(), progress);
   if (options.pictures) {
     progress.begin("pictures");

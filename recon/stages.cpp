@@ -11,8 +11,9 @@ namespace rugae {
 Stages::Stages()
     : follow([](const FrameSource& frames, const Keyframes& keyframes, const ReconOptions& options,
                 Progress& progress) {
-        return follow_tracks(frames, keyframes, options.align, options.tracks, options.seed,
-                             progress);
+        AlignOptions align = options.align;
+        if (options.method == "dense") align.neighbours = options.revisits.neighbours;
+        return follow_tracks(frames, keyframes, align, options.tracks, options.seed, progress);
       }),
       structure([](const FrameSource& frames, const std::vector<int>& keyframes,
                    std::vector<Track> tracks, const ReconOptions& options, Progress& progress) {
