@@ -71,7 +71,8 @@ TEST(ReconOptionsTest, BrokenValuesAreNamedWithTheirPlace) {
             "study.yaml:2:12: grid_px is 1, expected 2 to 64");
   EXPECT_NE(message([] { read("align:\n  grid_pix: 8\n"); }).find("grid_px"), std::string::npos);
   EXPECT_EQ(message([] { read("method: papper\n"); }),
-            "study.yaml:1:9: method 'papper' is not known, expected paper or dense; did you mean 'paper'?");
+            "study.yaml:1:9: method 'papper' is not known, expected paper or dense; did you mean "
+            "'paper'?");
   KeyframeOptions keyframes;
   keyframes.mean_flow_px = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(message([&] { keyframes.check(); }),

@@ -141,7 +141,8 @@ TEST_F(Revisits, WrongSightsAreNotAccepted) {
   EXPECT_LT(20 * wrong, found) << wrong;
 }
 
-// Every second key frame but the last is taken out of the map and found in it again as a frame between others.
+// Every second key frame but the last is taken out of the map and found in it again as a frame
+// between others.
 TEST_F(Revisits, FramesBetweenArePlacedInTheMap) {
   const Structure whole = linked();
   Structure half = whole;
