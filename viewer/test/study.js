@@ -1,6 +1,7 @@
 // A small real study and its page: a small camera on a short path, 12 or 10 frames, each reconstructed and given up.
 
-import {execFileSync} from "node:child_process";
+import assert from "node:assert/strict";
+import {spawnSync} from "node:child_process";
 import {mkdtempSync, readFileSync, rmSync, writeFileSync} from "node:fs";
 import {tmpdir} from "node:os";
 import {join} from "node:path";
@@ -23,7 +24,8 @@ commands: {nothing: ["/bin/false"]}
 methods: [paper, nothing]
 axes: {frames: [12, 10]}
 `);
-  execFileSync(program, ["run", join(folder, "study.yaml"), "--out", join(folder, "out")], {stdio: ["ignore", "ignore", "inherit"]});
+  const run = spawnSync(program, ["run", join(folder, "study.yaml"), "--out", join(folder, "out")], {stdio: ["ignore", "ignore", "inherit"]});
+  assert.equal(run.status, 3, "expected the exit code of a study in which cells failed");
   return {folder, remove: () => rmSync(folder, {recursive: true, force: true})};
 }
 
