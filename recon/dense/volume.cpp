@@ -133,12 +133,12 @@ std::vector<std::uint64_t> DistanceVolume::touched_blocks(const View& view) cons
       }
     }
     std::ranges::sort(keys);
-    keys.erase(std::ranges::unique(keys).begin(), keys.end());
+    keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   });
   std::vector<std::uint64_t> all;
   for (const auto& keys : of_rows) all.insert(all.end(), keys.begin(), keys.end());
   std::ranges::sort(all);
-  all.erase(std::ranges::unique(all).begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
   return all;
 }
 
