@@ -41,8 +41,8 @@ std::optional<cv::Mat> decoded_png(const std::string& name, std::string_view byt
 
 cv::Mat decode(const fs::path& file, int flags) {
   const std::string bytes = read_text(file);
-  check_image_is_whole(file.string(), bytes);
   if (std::optional<cv::Mat> image = decoded_png(file.string(), bytes, flags)) return *image;
+  check_image_is_whole(file.string(), bytes);
   cv::Mat image;
   try {
     image = cv::imdecode(

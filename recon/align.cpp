@@ -12,6 +12,7 @@
 
 #include "core/random.h"
 #include "recon/flow.h"
+#include "recon/mask_at.h"
 #include "recon/patch_align.h"
 #include "recon/refine.h"
 
@@ -89,11 +90,6 @@ Vec2 sample_flow(const cv::Mat& flow, const Vec2& p) {
   };
   return (1 - fy) * ((1 - fx) * at(ix, iy) + fx * at(ix + 1, iy)) +
          fy * ((1 - fx) * at(ix, iy + 1) + fx * at(ix + 1, iy + 1));
-}
-
-bool mask_at(const cv::Mat& mask, const Vec2& p) {
-  return p.x() >= 0.0 && p.y() >= 0.0 && p.x() < mask.cols && p.y() < mask.rows &&
-         mask.at<unsigned char>(static_cast<int>(p.y()), static_cast<int>(p.x())) != 0;
 }
 
 Mat3 from_cv(const cv::Mat& m) {

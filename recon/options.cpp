@@ -86,6 +86,20 @@ void fields(Visitor& v, RevisitOptions& o) {
 }
 
 template <typename Visitor>
+void fields(Visitor& v, DenseOptions& o) {
+  v.number("width_px", o.width_px, 32, 4096);
+  v.number("max_depth_maps", o.max_depth_maps, 1, 10000);
+  v.number("depth_maps_a_point", o.depth_maps_a_point, 1, 100);
+  v.number("views", o.views, 2, 32);
+  v.number("window_radius_px", o.window_radius_px, 1, 20);
+  v.number("min_score", o.min_score, 0.0, 1.0);
+  v.number("max_sigma_share", o.max_sigma_share, 1e-6, 1.0);
+  v.number("consistent_maps", o.consistent_maps, 0, 100);
+  v.number("consistent_sigmas", o.consistent_sigmas, 0.1, 100.0);
+  v.number("voxel_px", o.voxel_px, 0.5, 100.0);
+}
+
+template <typename Visitor>
 void fields(Visitor& v, ReconOptions& o) {
   v.word("method", o.method, kMethods);
   v.section("preprocess", o.preprocess);
@@ -112,6 +126,7 @@ void MosaicOptions::check() const { check_fields(*this, "mosaic"); }
 void ShadingOptions::check() const { check_fields(*this, "shading"); }
 void MapOptions::check() const { check_fields(*this, "map"); }
 void RevisitOptions::check() const { check_fields(*this, "revisits"); }
+void DenseOptions::check() const { check_fields(*this, "dense"); }
 void ReconOptions::check() const { check_fields(*this, "recon"); }
 
 void read_options(YamlReader yaml, ReconOptions& options) { read_fields(std::move(yaml), options); }

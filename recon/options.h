@@ -5,7 +5,6 @@
 #include <string>
 
 #include "core/yaml.h"
-#include "recon/dense/dense_options.h"
 
 namespace rugae {
 
@@ -80,6 +79,21 @@ struct RevisitOptions {
   int neighbours = 1;       // in place of AlignOptions': what is seen again ties further apart
   int rounds = 2;           // of looking for it and adjusting all; 0: none
   double search_px = 24.0;  // around where a point should be seen, at 640 px width
+  void check() const;
+};
+
+/// Of `dense`: its map.
+struct DenseOptions {
+  int width_px = 400;              // of a depth map, at most; it shows all that the lens sees
+  int max_depth_maps = 100;        // key frames that get one; bounds time and memory
+  int depth_maps_a_point = 4;      // wanted: each sparse point in so many of them
+  int views = 8;                   // other key frames each is compared with
+  int window_radius_px = 4;        // of the correlation, in the depth map's pixels
+  double min_score = 0.45;         // correlation of a depth that is believed
+  double max_sigma_share = 0.05;   // standard deviation of a depth that is believed, over the depth
+  int consistent_maps = 2;         // other depth maps that must agree
+  double consistent_sigmas = 3.0;  // within so many joint standard deviations
+  double voxel_px = 4.0;           // side of a voxel, in the wall's width of a depth map's pixel
   void check() const;
 };
 

@@ -11,6 +11,7 @@
 #include "core/check.h"
 #include "recon/depth_field.h"
 #include "recon/map.h"
+#include "recon/masked_blur.h"
 #include "recon/pinhole.h"
 
 namespace rugae {
@@ -33,17 +34,6 @@ constexpr double kMinSpread = 1e-3;
 constexpr double kUnseenByAnchorWeight = 0.3;
 /// A wall seen more obliquely than this (80 degrees) is a fold's edge bridged by the smooth part.
 constexpr float kMinIncidenceCosine = 0.17f;
-
-/// Mean over known pixels only: blur(value * known) / blur(known).
-cv::Mat masked_blur(const cv::Mat& values, const cv::Mat& valid, double sigma) {
-  cv::Mat known, sum, weight;
-  valid.convertTo(known, CV_32F, 1.0 / 255.0);
-  cv::GaussianBlur(values.mul(known), sum, {}, sigma, sigma, cv::BORDER_CONSTANT);
-  cv::GaussianBlur(known, weight, {}, sigma, sigma, cv::BORDER_CONSTANT);
-  cv::Mat mean = sum / cv::max(weight, 1e-6);
-  mean.setTo(0.0f, valid == 0);
-  return mean;
-}
 
 /// The relief's details between the grain and what the smooth part follows, px.
 cv::Mat details(const cv::Mat& relief, const cv::Mat& valid, double grain_px, double spacing_px) {

@@ -11,6 +11,7 @@
 #include "recon/bundle.h"
 #include "recon/cache.h"
 #include "recon/flow_guess.h"
+#include "recon/frames_between.h"
 #include "recon/tracks.h"
 
 namespace rugae {
@@ -145,21 +146,10 @@ std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
                                                  const BundleOptions& options, std::uint64_t seed,
                                                  Progress& progress) {
   const int n = frames.size();
-  std::vector<std::optional<Rigid3>> poses(n);
-  std::vector<int> placed_frames, placed_keyframes;  // ascending frame indices and their positions
-  std::vector<char> is_placed_keyframe(n, 0);
-  for (std::size_t k = 0; k < structure.frames.size(); ++k) {
-    if (!structure.placed[k]) continue;
-    poses[structure.frames[k]] = structure.cam_from_world[k];
-    is_placed_keyframe[structure.frames[k]] = 1;
-    placed_frames.push_back(structure.frames[k]);
-    placed_keyframes.push_back(static_cast<int>(k));
-  }
-  std::vector<int> rest;
-  for (int f = 0; f < n; ++f)
-    if (!is_placed_keyframe[f]) rest.push_back(f);
+  std::vector<std::optional<Rigid3>> poses = keyframe_poses(structure, n);
+  const std::vector<int> rest = without_pose(poses), placed = placed_keyframes(structure);
   progress.begin("resection", rest.size());
-  if (placed_frames.empty()) {
+  if (placed.empty()) {
     progress.end("nothing to place frames in");
     return poses;
   }
@@ -181,28 +171,15 @@ std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
     tbb::parallel_for(begin, end, [&](std::size_t i) {
       const int f = rest[i];
       const AlignImage moving = moving_at(f);
-      const auto after = static_cast<std::size_t>(
-          std::lower_bound(placed_frames.begin(), placed_frames.end(), f) - placed_frames.begin());
-      // Between two key frames the pose is thought to lie on the way from one to the other; the
-      // nearer one is asked first.
-      std::vector<std::size_t> anchors;
-      if (after > 0) anchors.push_back(after - 1);
-      if (after < placed_frames.size()) anchors.push_back(after);
-      std::optional<Rigid3> expected;
-      if (anchors.size() == 2) {
-        const int a = placed_frames[after - 1], b = placed_frames[after];
-        if (f - a > b - f) std::swap(anchors[0], anchors[1]);
-        expected = interpolate(poses[a]->inverse(), poses[b]->inverse(),
-                               static_cast<double>(f - a) / (b - a))
-                       .inverse();
-      }
-      for (const std::size_t anchor : anchors) {
-        const std::vector<Seen>& points = seen[placed_keyframes[anchor]];
+      // The nearer key frame is asked first.
+      const Between around = between(structure, placed, f);
+      for (const int k : around.keyframes) {
+        const std::vector<Seen>& points = seen[k];
         if (static_cast<int>(points.size()) < kMinPoints) continue;
-        const int key = placed_frames[anchor];
+        const int key = structure.frames[k];
         const Shared reference = references.get(key, [&] { return reference_at(key); });
-        const Sighted sighted =
-            follow(frames.lens(), points, *reference, moving, expected, align_options, seed);
+        const Sighted sighted = follow(frames.lens(), points, *reference, moving,
+                                       around.cam_from_world, align_options, seed);
         const auto p = place_by_points(sighted.points, sighted.rays, focal_px, options);
         if (!p) continue;
         poses[f] = p->cam_from_world;

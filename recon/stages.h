@@ -33,7 +33,7 @@ struct Stages {
                                            const ReconOptions&)>
       depth;
 
-  /// The paper's.
+  /// Ours, by the method that the options name.
   Stages();
 };
 

@@ -8,6 +8,7 @@
 
 #include "core/check.h"
 #include "core/sim3.h"
+#include "recon/frames_between.h"
 #include "recon/growth.h"
 #include "recon/resection.h"
 #include "studies/true_motion.h"
@@ -36,6 +37,12 @@ class Grids {
   LensProjector observed_, preprocessed_;
 };
 
+// An observation, and the pixel in which its track began.
+struct Moved {
+  Track::Observation* observation;
+  Vec2 first_px;
+};
+
 class Oracle {
  public:
   Oracle(const std::filesystem::path& dataset, const Lens& lens) : motion_(dataset), lens_(lens) {}
@@ -44,14 +51,15 @@ class Oracle {
     const Grids grids(lens_, frames.lens());
     std::vector<Track>& tracks = followed.tracks;
     // The wall point of a track is what its first observation sees.
-    std::map<std::pair<int, int>, std::vector<Track*>> seen_in;  // by first and other key frame
-    for (Track& track : tracks)
-      for (const Track::Observation& o : track.observations)
-        seen_in[{track.observations.front().keyframe, o.keyframe}].push_back(&track);
-    std::map<const Track*, Vec2> first;  // its pixel, which is moved as well
-    for (const Track& track : tracks) first[&track] = track.observations.front().pixel;
+    std::map<std::pair<int, int>, std::vector<Moved>> seen_in;  // by first and other key frame
+    for (Track& track : tracks) {
+      const Track::Observation first = track.observations.front();  // which is moved as well
+      for (Track::Observation& o : track.observations)
+        seen_in[{first.keyframe, o.keyframe}].push_back({&o, first.pixel});
+    }
     for (const auto& [keyframes, group] : seen_in)
-      move_observations(keyframes, followed.keyframes, grids, first, group);
+      move_observations(followed.keyframes[keyframes.first], followed.keyframes[keyframes.second],
+                        grids, group);
     for (Track& track : tracks)
       std::erase_if(track.observations, [](const auto& o) { return !o.inlier; });
     std::erase_if(tracks, [](const Track& track) { return track.observations.size() < 2; });
@@ -61,13 +69,8 @@ class Oracle {
 
   std::vector<std::optional<Rigid3>> resect(const FrameSource& frames, const Structure& structure,
                                             const ReconOptions& options, Progress& progress) const {
-    std::vector<std::optional<Rigid3>> poses(static_cast<std::size_t>(frames.size()));
-    std::vector<int> keyframes;  // those placed
-    for (int k = 0; k < static_cast<int>(structure.frames.size()); ++k) {
-      if (!structure.placed[k]) continue;
-      poses[structure.frames[k]] = structure.cam_from_world[k];
-      keyframes.push_back(k);
-    }
+    auto poses = keyframe_poses(structure, frames.size());
+    const std::vector<int> keyframes = placed_keyframes(structure);
     progress.begin("resection by the true correspondences", poses.size());
     for (int f = 0; f < frames.size() && !keyframes.empty(); ++f) {
       progress.step();
@@ -136,23 +139,20 @@ class Oracle {
     return motion_.truth().track()[static_cast<std::size_t>(frame)].world_from_camera;
   }
 
-  // Moves the observations of tracks in the second key frame to where the wall points that they
-  // began with in the first are seen; those that are hidden are marked.
-  void move_observations(const std::pair<int, int>& keyframes, const std::vector<int>& frames,
-                         const Grids& grids, const std::map<const Track*, Vec2>& first,
-                         const std::vector<Track*>& tracks) const {
+  // Moves observations in frame `to` to where the wall points that their tracks began with in frame
+  // `from` are seen; those that are hidden are marked.
+  void move_observations(int from, int to, const Grids& grids,
+                         const std::vector<Moved>& group) const {
     std::vector<Track::Observation*> observations;
     std::vector<Vec2> begun;
-    for (Track* track : tracks) {
-      const auto o =
-          std::ranges::find(track->observations, keyframes.second, &Track::Observation::keyframe);
-      o->inlier = false;
-      const auto pixel = grids.observed(first.at(track));
+    for (const Moved& moved : group) {
+      moved.observation->inlier = false;
+      const auto pixel = grids.observed(moved.first_px);
       if (!pixel) continue;
-      observations.push_back(&*o);
+      observations.push_back(moved.observation);
       begun.push_back(*pixel);
     }
-    const auto landings = motion_.follow(frames[keyframes.first], frames[keyframes.second], begun);
+    const auto landings = motion_.follow(from, to, begun);
     for (std::size_t i = 0; i < observations.size(); ++i) {
       if (landings[i].sight != Sight::seen) continue;
       const auto pixel = grids.preprocessed(landings[i].pixel);

@@ -26,9 +26,7 @@ Seen seen_at(const DepthMap& map, const Vec3& p_cam) {
   Seen seen{p_cam.z()};
   if (!(p_cam.z() > 0.0)) return seen;
   const Vec2 pixel = map.grid.project(p_cam);
-  if (!(pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < map.grid.width &&
-        pixel.y() < map.grid.height))
-    return seen;
+  if (!map.grid.contains(pixel)) return seen;
   const int x = static_cast<int>(pixel.x()), y = static_cast<int>(pixel.y());
   seen.depth = map.depth.at<float>(y, x);
   seen.sigma = map.sigma.at<float>(y, x);

@@ -6,7 +6,7 @@
 
 #include "core/mesh.h"
 #include "core/progress.h"
-#include "recon/dense/dense_options.h"
+#include "recon/options.h"
 #include "recon/preprocess/preprocess.h"
 #include "recon/structure.h"
 

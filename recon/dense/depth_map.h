@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "core/rigid3.h"
-#include "recon/dense/dense_options.h"
 #include "recon/dense/stereo_image.h"
+#include "recon/options.h"
 #include "recon/structure.h"
 
 namespace rugae {

@@ -36,8 +36,7 @@ DepthPrior depth_prior(const Structure& structure, int keyframe, const PinholeGr
     const Vec3 p_cam = cam_from_world * track.point;
     if (!(p_cam.z() > 0.0)) continue;
     const Vec2 pixel = grid.project(p_cam);
-    if (pixel.x() < 0.0 || pixel.y() < 0.0 || pixel.x() > grid.width || pixel.y() > grid.height)
-      continue;
+    if (!grid.contains(pixel)) continue;
     samples.push_back({pixel, std::log(p_cam.z()), 0.0, 1.0});
   }
   if (samples.size() < kMinPoints) return {};

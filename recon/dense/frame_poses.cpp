@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "core/rigid3.h"
 #include "recon/dense/register_patch.h"
+#include "recon/frames_between.h"
 #include "recon/resection.h"
 #include "recon/tracks.h"
 
@@ -17,30 +17,6 @@ constexpr double kReferenceWidthPx = 640.0;
 constexpr double kSearchPx = 16.0;         // around where a patch should be, at 640 px width
 constexpr std::size_t kMostPatches = 300;  // looked for: more adds time and no precision
 constexpr int kFramesAtOnce = 16;          // between two steps of the progress line
-
-struct Neighbours {
-  std::vector<int> keyframes;  // before and after
-  std::vector<Rigid3> guesses;
-};
-
-Neighbours neighbours_of(int frame, const Structure& structure,
-                         const std::vector<int>& placed_keyframes) {
-  const auto after = std::ranges::lower_bound(placed_keyframes, frame, {},
-                                              [&](int k) { return structure.frames[k]; });
-  Neighbours found;
-  if (after != placed_keyframes.begin()) found.keyframes.push_back(*(after - 1));
-  if (after != placed_keyframes.end()) found.keyframes.push_back(*after);
-  if (found.keyframes.size() == 2) {
-    const int a = found.keyframes[0], b = found.keyframes[1];
-    const double share = static_cast<double>(frame - structure.frames[a]) /
-                         (structure.frames[b] - structure.frames[a]);
-    found.guesses.push_back(interpolate(structure.cam_from_world[a].inverse(),
-                                        structure.cam_from_world[b].inverse(), share)
-                                .inverse());
-  }
-  for (const int k : found.keyframes) found.guesses.push_back(structure.cam_from_world[k]);
-  return found;
-}
 
 // Patches seen by any of the key frames, at most kMostPatches, spread over the list.
 std::vector<const WallPatch*> seen_by(const std::vector<int>& keyframes,
@@ -59,9 +35,9 @@ std::vector<const WallPatch*> seen_by(const std::vector<int>& keyframes,
 }
 
 std::optional<Rigid3> place(const std::vector<const WallPatch*>& patches, const PatchImage& image,
-                            const Rigid3& guess, const Lens& lens, const BundleOptions& options) {
-  const PatchRegistrar registrar(lens);
-  const LensProjector projector(lens);
+                            const Rigid3& guess, const PatchRegistrar& registrar,
+                            const LensProjector& projector, const Lens& lens,
+                            const BundleOptions& options) {
   const double reach_px = kSearchPx * lens.width / kReferenceWidthPx;
   std::vector<Vec3> points;
   std::vector<Vec2> rays;
@@ -85,18 +61,10 @@ std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
                                                 const std::vector<WallPatch>& patches,
                                                 const BundleOptions& options, Progress& progress) {
   const int n = frames.size();
-  std::vector<std::optional<Rigid3>> poses(static_cast<std::size_t>(n));
-  std::vector<int> placed_keyframes;
-  for (std::size_t k = 0; k < structure.frames.size(); ++k) {
-    if (!structure.placed[k]) continue;
-    poses[structure.frames[k]] = structure.cam_from_world[k];
-    placed_keyframes.push_back(static_cast<int>(k));
-  }
-  std::vector<int> rest;
-  for (int f = 0; f < n; ++f)
-    if (!poses[f]) rest.push_back(f);
+  std::vector<std::optional<Rigid3>> poses = keyframe_poses(structure, n);
+  const std::vector<int> rest = without_pose(poses), placed = placed_keyframes(structure);
   progress.begin("frames between", rest.size());
-  if (placed_keyframes.empty()) {
+  if (placed.empty()) {
     progress.end("nothing to place frames in");
     return poses;
   }
@@ -108,16 +76,21 @@ std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
     for (const auto& o : structure.tracks[t].observations)
       if (patch_of[t] >= 0) patches_of[o.keyframe].push_back(patch_of[t]);
 
+  const PatchRegistrar registrar(frames.lens());
+  const LensProjector projector(frames.lens());
   const cv::Mat none = cv::Mat::zeros(frames.valid().size(), CV_8U);
   for (std::size_t begin = 0; begin < rest.size(); begin += kFramesAtOnce) {
     const std::size_t end = std::min(rest.size(), begin + kFramesAtOnce);
     tbb::parallel_for(begin, end, [&](std::size_t i) {
       const int f = rest[i];
       const PatchImage image = prepare_patch_image({f, frames.gray(f), {}, none, frames.valid()});
-      const Neighbours near = neighbours_of(f, structure, placed_keyframes);
-      const auto seen = seen_by(near.keyframes, patches_of, patches);
-      for (const Rigid3& guess : near.guesses) {
-        poses[f] = place(seen, image, guess, frames.lens(), options);
+      const Between around = between(structure, placed, f);
+      std::vector<Rigid3> guesses;
+      if (around.cam_from_world) guesses.push_back(*around.cam_from_world);
+      for (const int k : around.keyframes) guesses.push_back(structure.cam_from_world[k]);
+      const auto seen = seen_by(around.keyframes, patches_of, patches);
+      for (const Rigid3& guess : guesses) {
+        poses[f] = place(seen, image, guess, registrar, projector, frames.lens(), options);
         if (poses[f]) break;
       }
     });

@@ -13,8 +13,8 @@
 namespace rugae {
 
 /// Poses of all frames, cam_from_world. Placed key frames keep theirs; the others are looked for
-/// around the pose half way between those of the key frames before and after, with each of the two
-/// as a second and third guess. Empty where too few patches agree.
+/// around the pose on the way from the key frame before to the one after, then around those of the
+/// two, the nearer first. Empty where too few patches agree.
 std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
                                                 const Structure& structure,
                                                 const std::vector<WallPatch>& patches,

@@ -6,16 +6,19 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "recon/mask_at.h"
+
 namespace rugae {
 namespace {
 
 constexpr double kReferenceWidthPx = 640.0;
-constexpr double kRadiusPx = 12.0;    // of the registration, at 640 px width
-constexpr double kMaxMotionPx = 4.0;  // from its start, likewise
-constexpr double kMinCorrelation = 0.7;
-constexpr int kTemplateHalfPx = 4;  // of the search, coarse
+constexpr double kRadiusPx = 12.0;       // of the registration, at 640 px width
+constexpr double kMaxMotionPx = 4.0;     // from its start, likewise
+constexpr double kMinCorrelation = 0.7;  // of what is then judged by consensus
+constexpr int kTemplateHalfPx = 4;       // of the search, coarse
 constexpr int kTemplateSide = 2 * kTemplateHalfPx + 1;
-constexpr double kMinSearchScore = 0.6;
+constexpr double kMinSearchScore =
+    0.6;  // a coarse sieve: what passes must settle, and agree with the others
 
 PointRefinementOptions refinement_of(const Lens& lens) {
   const double scale = std::min(lens.width, kFineWidthPx) / kReferenceWidthPx;
@@ -48,21 +51,14 @@ double peak_offset(float before, float at, float after) {
 
 }  // namespace
 
-bool usable_at(const cv::Mat& usable, const Vec2& pixel) {
-  const int x = static_cast<int>(std::floor(pixel.x())),
-            y = static_cast<int>(std::floor(pixel.y()));
-  return x >= 0 && y >= 0 && x < usable.cols && y < usable.rows &&
-         usable.at<unsigned char>(y, x) != 0;
-}
-
 PatchRegistrar::PatchRegistrar(const Lens& lens) : refiner_(refinement_of(lens)) {}
 
 std::optional<Vec2> PatchRegistrar::search(const WallPatch& patch, const PatchSight& sight,
                                            const PatchImage& image, double reach_px) const {
   if (patch.coarse.empty()) return std::nullopt;
-  const Vec2 at = sight.pixel / image.shrink;
+  const Vec2 at = sight.pixel / image.coarse_shrink;
   const int x = static_cast<int>(std::floor(at.x())), y = static_cast<int>(std::floor(at.y()));
-  const int half = kTemplateHalfPx + static_cast<int>(std::ceil(reach_px / image.shrink));
+  const int half = kTemplateHalfPx + static_cast<int>(std::ceil(reach_px / image.coarse_shrink));
   const cv::Rect window = cv::Rect(x - half, y - half, 2 * half + 1, 2 * half + 1) &
                           cv::Rect({0, 0}, image.coarse.size());
   if (window.width < kTemplateSide || window.height < kTemplateSide) return std::nullopt;
@@ -80,7 +76,7 @@ std::optional<Vec2> PatchRegistrar::search(const WallPatch& patch, const PatchSi
     middle.x() += peak_offset(score(-1, 0), score(0, 0), score(1, 0));
   if (place.y > 0 && place.y + 1 < scores.rows)
     middle.y() += peak_offset(score(0, -1), score(0, 0), score(0, 1));
-  return middle * image.shrink;
+  return middle * image.coarse_shrink;
 }
 
 std::optional<Vec2> PatchRegistrar::settle(const WallPatch& patch, const PatchSight& sight,
@@ -89,7 +85,7 @@ std::optional<Vec2> PatchRegistrar::settle(const WallPatch& patch, const PatchSi
       refiner_(patch.fine, image.fine, patch.fine_px, start / image.fine_shrink, sight.linear);
   if (!place) return std::nullopt;
   const Vec2 pixel = *place * image.fine_shrink;
-  return usable_at(image.usable, pixel) ? std::optional(pixel) : std::nullopt;
+  return mask_at(image.usable, pixel) ? std::optional(pixel) : std::nullopt;
 }
 
 std::optional<Vec2> PatchRegistrar::find(const WallPatch& patch, const PatchSight& sight,

@@ -10,9 +10,7 @@
 
 namespace rugae {
 
-/// 255 in `usable` at the pixel; false outside.
-bool usable_at(const cv::Mat& usable, const Vec2& pixel);
-
+/// Calls are thread-safe.
 class PatchRegistrar {
  public:
   /// Of frames seen through this lens.

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "recon/dense/register_patch.h"
+#include "recon/mask_at.h"
 #include "recon/resection.h"
 #include "recon/tracks.h"
 
@@ -69,25 +70,33 @@ std::vector<Seen> agreeing(const std::vector<Seen>& candidates,
   return kept;
 }
 
-// Which observation of each track is in which key frame.
-std::vector<std::vector<int>> observation_of(const Structure& structure,
-                                             const std::vector<WallPatch>& patches) {
-  std::vector<std::vector<int>> of(structure.frames.size(), std::vector<int>(patches.size(), -1));
+// An observation of a patch's track.
+struct Known {
+  std::size_t patch;
+  int observation;
+};
+
+// Those of each key frame.
+std::vector<std::vector<Known>> known_observations(const Structure& structure,
+                                                   const std::vector<WallPatch>& patches) {
+  std::vector<std::vector<Known>> known(structure.frames.size());
   for (std::size_t p = 0; p < patches.size(); ++p) {
     const Track& track = structure.tracks[static_cast<std::size_t>(patches[p].track)];
     for (std::size_t i = 0; i < track.observations.size(); ++i)
-      of[static_cast<std::size_t>(track.observations[i].keyframe)][p] = static_cast<int>(i);
+      known[static_cast<std::size_t>(track.observations[i].keyframe)].push_back(
+          {p, static_cast<int>(i)});
   }
-  return of;
+  return known;
 }
 
 FrameResult look_in(int keyframe, const PatchImage& image, const std::vector<WallPatch>& patches,
-                    const std::vector<int>& known, const Structure& structure, const Lens& lens,
+                    const std::vector<Known>& known, const PatchRegistrar& registrar,
+                    const LensProjector& projector, const Structure& structure, const Lens& lens,
                     const RevisitOptions& options, const BundleOptions& bundle) {
   const double scale = lens.width / kReferenceWidthPx;
-  const PatchRegistrar registrar(lens);
-  const LensProjector projector(lens);
   const Rigid3& pose = structure.cam_from_world[static_cast<std::size_t>(keyframe)];
+  std::vector<int> observation_of(patches.size(), -1);
+  for (const Known& k : known) observation_of[k.patch] = k.observation;
   FrameResult result;
   std::vector<Seen> candidates;
   for (std::size_t p = 0; p < patches.size(); ++p) {
@@ -95,16 +104,16 @@ FrameResult look_in(int keyframe, const PatchImage& image, const std::vector<Wal
     if (patch.anchor == keyframe) continue;
     const auto sight = foretell(patch, pose, projector);
     if (!sight) continue;
-    if (known[p] >= 0) {
+    if (observation_of[p] >= 0) {
       const Vec2 start = structure.tracks[static_cast<std::size_t>(patch.track)]
-                             .observations[static_cast<std::size_t>(known[p])]
+                             .observations[static_cast<std::size_t>(observation_of[p])]
                              .pixel;
       const auto pixel = registrar.settle(patch, *sight, image, start);
       if (pixel && (*pixel - start).norm() <= kMaxShiftPx * scale)
-        result.registered.push_back({p, *pixel, known[p]});
+        result.registered.push_back({p, *pixel, observation_of[p]});
       continue;
     }
-    if (!usable_at(image.usable, sight->pixel)) continue;
+    if (!mask_at(image.usable, sight->pixel)) continue;
     ++result.foretold;
     const auto pixel = registrar.find(patch, *sight, image, options.search_px * scale);
     if (pixel) candidates.push_back({p, *pixel});
@@ -120,15 +129,17 @@ RevisitReport observe_again(const FrameSource& frames, const std::vector<WallPat
                             const RevisitOptions& options, const BundleOptions& bundle,
                             Structure& structure, Progress& progress) {
   const std::size_t n = structure.frames.size();
-  const auto known = observation_of(structure, patches);
+  const auto known = known_observations(structure, patches);
+  const PatchRegistrar registrar(frames.lens());
+  const LensProjector projector(frames.lens());
   std::vector<FrameResult> results(n);
   for (std::size_t begin = 0; begin < n; begin += kAtOnce) {
     const std::size_t end = std::min(n, begin + kAtOnce);
     tbb::parallel_for(begin, end, [&](std::size_t k) {
       if (!structure.placed[k]) return;
       const PatchImage image = prepare_patch_image(frames.pose_frame(structure.frames[k]));
-      results[k] = look_in(static_cast<int>(k), image, patches, known[k], structure, frames.lens(),
-                           options, bundle);
+      results[k] = look_in(static_cast<int>(k), image, patches, known[k], registrar, projector,
+                           structure, frames.lens(), options, bundle);
     });
     progress.step(end - begin);
   }

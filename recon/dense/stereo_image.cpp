@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/check.h"
+#include "recon/masked_blur.h"
 
 namespace rugae {
 namespace {
@@ -17,18 +18,13 @@ constexpr float kDarkest = 8.0f;
 
 /// Brightness over its local mean, over known pixels only, minus one.
 cv::Mat relative_brightness(const cv::Mat& gray, const cv::Mat& known, double sigma_px) {
-  cv::Mat weight, sum, total;
-  known.convertTo(weight, CV_32F, 1.0 / 255.0);
-  cv::GaussianBlur(gray.mul(weight), sum, {}, sigma_px, sigma_px, cv::BORDER_CONSTANT);
-  cv::GaussianBlur(weight, total, {}, sigma_px, sigma_px, cv::BORDER_CONSTANT);
+  const cv::Mat mean = masked_blur(gray, known, sigma_px);
   constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
   cv::Mat texture(gray.size(), CV_32F);
   for (int y = 0; y < gray.rows; ++y) {
-    const auto *g = gray.ptr<float>(y), *s = sum.ptr<float>(y), *n = total.ptr<float>(y);
-    const auto* k = known.ptr<uchar>(y);
+    const auto *g = gray.ptr<float>(y), *m = mean.ptr<float>(y);
     auto* t = texture.ptr<float>(y);
-    for (int x = 0; x < gray.cols; ++x)
-      t[x] = k[x] != 0 && s[x] > kDarkest * n[x] ? g[x] * n[x] / s[x] - 1.0f : kUnknown;
+    for (int x = 0; x < gray.cols; ++x) t[x] = m[x] > kDarkest ? g[x] / m[x] - 1.0f : kUnknown;
   }
   return texture;
 }

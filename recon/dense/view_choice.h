@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "recon/dense/dense_options.h"
+#include "recon/options.h"
 #include "recon/structure.h"
 
 namespace rugae {

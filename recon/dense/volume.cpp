@@ -153,9 +153,7 @@ void DistanceVolume::update(const View& view, std::uint64_t key, Block& block) c
             view.map.cam_from_world * (voxel_ * (origin + Vec3i(x, y, z)).cast<double>());
         if (!(p_cam.z() > 0.0)) continue;
         const Vec2 pixel = grid.project(p_cam);
-        if (!(pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < grid.width &&
-              pixel.y() < grid.height))
-          continue;
+        if (!grid.contains(pixel)) continue;
         const int px = static_cast<int>(pixel.x()), py = static_cast<int>(pixel.y());
         if (!view.known(px, py)) continue;
         const double slant = view.slant.at<float>(py, px);

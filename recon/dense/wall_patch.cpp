@@ -106,7 +106,8 @@ std::vector<WallPatch> patches_of(const PatchImage& image, const Lens& lens,
         world_from_cam.rotation * (z * Vec3::UnitY() - z * z * plane->y() * ray) / lens.fy;
     if (!cut(image.fine, p.pixel / image.fine_shrink, kFineHalfPx, patch.fine, patch.fine_px))
       continue;
-    if (!cut(image.coarse, p.pixel / image.shrink, kCoarseHalfPx, patch.coarse, patch.coarse_px))
+    if (!cut(image.coarse, p.pixel / image.coarse_shrink, kCoarseHalfPx, patch.coarse,
+             patch.coarse_px))
       patch.coarse.release();  // near the border: followed, but not looked for
     patches.push_back(std::move(patch));
   }
@@ -131,8 +132,9 @@ PatchImage prepare_patch_image(const Frame& frame) {
   };
   image.fine_shrink = shrink_to(kFineWidthPx);
   shrunk(frame.gray, image.fine_shrink).convertTo(image.fine, CV_32F, 1.0 / 255.0);
-  image.shrink = shrink_to(kCoarseWidthPx);
-  const cv::Mat small = shrunk(frame.gray, image.shrink), valid = shrunk(frame.valid, image.shrink);
+  image.coarse_shrink = shrink_to(kCoarseWidthPx);
+  const cv::Mat small = shrunk(frame.gray, image.coarse_shrink),
+                valid = shrunk(frame.valid, image.coarse_shrink);
   image.coarse = even_light(small, valid == 255);
   image.usable = frame.valid & ~frame.reflection;
   return image;

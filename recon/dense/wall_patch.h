@@ -15,10 +15,10 @@ namespace rugae {
 
 /// A key frame as patches are cut from it and looked for in it.
 struct PatchImage {
-  cv::Mat fine;                            // CV_32F, [0, 1], kFineWidthPx wide at most
-  cv::Mat coarse;                          // CV_8U, light evened out, kCoarseWidthPx wide
-  double fine_shrink = 1.0, shrink = 1.0;  // of the fine and the coarse image
-  cv::Mat usable;                          // CV_8U: wall, no reflection
+  cv::Mat fine;                                   // CV_32F, [0, 1], kFineWidthPx wide at most
+  cv::Mat coarse;                                 // CV_8U, light evened out, kCoarseWidthPx wide
+  double fine_shrink = 1.0, coarse_shrink = 1.0;  // of the fine and the coarse image
+  cv::Mat usable;                                 // CV_8U: wall, no reflection
 };
 
 /// A place is found to a tenth of a pixel of these, which is what its texture and the noise allow:

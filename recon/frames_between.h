@@ -1,0 +1,30 @@
+#pragma once
+// Frames that are no key frames, and the placed key frames that they lie between.
+
+#include <optional>
+#include <vector>
+
+#include "core/rigid3.h"
+#include "recon/structure.h"
+
+namespace rugae {
+
+/// Places in Structure::frames, ascending.
+std::vector<int> placed_keyframes(const Structure& structure);
+
+/// Of `frames` frames, cam_from_world: those of placed key frames, the others empty.
+std::vector<std::optional<Rigid3>> keyframe_poses(const Structure& structure, int frames);
+
+/// The frames that have no pose.
+std::vector<int> without_pose(const std::vector<std::optional<Rigid3>>& poses);
+
+/// What a frame lies between.
+struct Between {
+  std::vector<int> keyframes;            // before and after, the nearer one first; one at an end
+  std::optional<Rigid3> cam_from_world;  // on the way from one to the other; empty at an end
+};
+
+/// `placed` as placed_keyframes() gives it, not empty.
+Between between(const Structure& structure, const std::vector<int>& placed, int frame);
+
+}  // namespace rugae
