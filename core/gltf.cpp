@@ -52,6 +52,13 @@ int add_vectors(tinygltf::Model& model, const std::vector<Vec3f>& vectors) {
                       vectors.size());
 }
 
+int add_scalars(tinygltf::Model& model, const std::vector<float>& values) {
+  const int view =
+      add_view(model, values.data(), values.size() * sizeof(float), TINYGLTF_TARGET_ARRAY_BUFFER);
+  return add_accessor(model, view, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_SCALAR,
+                      values.size());
+}
+
 // glTF vertex colours are linear.
 float linear_from_srgb(float c) {
   if (c <= 0.04045f) return c / 12.92f;
@@ -90,6 +97,12 @@ void write_glb(const std::filesystem::path& file, const TriangleMesh& mesh) {
     for (std::size_t v = 0; v < linear.size(); ++v)
       linear[v] = mesh.colors[v].unaryExpr(&linear_from_srgb);
     primitive.attributes["COLOR_0"] = add_vectors(model, linear);
+  }
+  if (mesh.sigma.size() == mesh.vertices.size()) {
+    std::vector<float> metres(mesh.sigma.size());
+    for (std::size_t v = 0; v < metres.size(); ++v)
+      metres[v] = static_cast<float>(kMetresPerMm) * mesh.sigma[v];
+    primitive.attributes["_SIGMA"] = add_scalars(model, metres);
   }
   std::vector<std::uint32_t> indices;
   indices.reserve(3 * mesh.triangles.size());

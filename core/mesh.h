@@ -18,6 +18,7 @@ struct TriangleMesh {
   std::vector<Vec3i> triangles;
   std::vector<Vec3f> normals;  // of vertices, unit
   std::vector<Vec3f> colors;   // of vertices, sRGB in [0, 1]
+  std::vector<float> sigma;    // of vertices, standard deviation along the normal, mm
 
   bool empty() const { return triangles.empty(); }
 };

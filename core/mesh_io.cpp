@@ -113,12 +113,14 @@ TriangleMesh read_mesh(const std::filesystem::path& file, double mm_per_unit) {
 void write_ply(const std::filesystem::path& file, const TriangleMesh& mesh, bool precise) {
   const bool with_normals = mesh.normals.size() == mesh.vertices.size() && !mesh.normals.empty();
   const bool with_colors = mesh.colors.size() == mesh.vertices.size() && !mesh.colors.empty();
+  const bool with_sigma = mesh.sigma.size() == mesh.vertices.size() && !mesh.sigma.empty();
   const char* real = precise ? "double" : "float";
   std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment lengths in mm\n";
   bytes += fmt::format("element vertex {}\n", mesh.vertices.size());
   for (const char* axis : {"x", "y", "z"}) bytes += fmt::format("property {} {}\n", real, axis);
   if (with_normals) bytes += "property float nx\nproperty float ny\nproperty float nz\n";
   if (with_colors) bytes += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  if (with_sigma) bytes += "property float sigma\n";
   bytes += fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n",
                        mesh.triangles.size());
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
@@ -132,6 +134,7 @@ void write_ply(const std::filesystem::path& file, const TriangleMesh& mesh, bool
       for (int k = 0; k < 3; ++k) append(bytes, mesh.normals[v][k]);
     if (with_colors)
       for (int k = 0; k < 3; ++k) append(bytes, byte_of(mesh.colors[v][k]));
+    if (with_sigma) append(bytes, mesh.sigma[v]);
   }
   for (const Vec3i& triangle : mesh.triangles) {
     append(bytes, static_cast<unsigned char>(3));

@@ -15,11 +15,12 @@ namespace rugae {
 TriangleMesh read_mesh(const std::filesystem::path& file, double mm_per_unit = 1.0);
 
 /// Binary little-endian PLY: float or double x y z (double when `precise`), nx ny nz and red green
-/// blue when present.
+/// blue, float sigma when present.
 void write_ply(const std::filesystem::path& file, const TriangleMesh& mesh, bool precise = false);
 
 /// glTF 2.0 binary (.glb) through tinygltf: positions in metres (the unit the format demands),
-/// normals, linear COLOR_0 when colours are present, one double-sided material; axes as stored.
+/// normals, linear COLOR_0 when colours and _SIGMA (metres) when sigma are present, one
+/// double-sided material; axes as stored.
 void write_glb(const std::filesystem::path& file, const TriangleMesh& mesh);
 
 }  // namespace rugae

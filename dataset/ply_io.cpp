@@ -13,10 +13,10 @@ namespace {
 
 struct Header {
   std::size_t vertices = 0, triangles = 0, size = 0;
-  bool precise = false, normals = false, colors = false;
+  bool precise = false, normals = false, colors = false, sigma = false;
   std::size_t vertex_bytes() const {
     return 3 * (precise ? sizeof(double) : sizeof(float)) + (normals ? 3 * sizeof(float) : 0) +
-           (colors ? 3 : 0);
+           (colors ? 3 : 0) + (sigma ? sizeof(float) : 0);
   }
 };
 constexpr std::size_t kTriangleBytes = 1 + 3 * sizeof(std::int32_t);
@@ -53,6 +53,7 @@ std::optional<Header> parse_header(std::string_view bytes) {
   if (!header.precise && !take("float x;float y;float z;")) return std::nullopt;
   header.normals = take("float nx;float ny;float nz;");
   header.colors = take("uchar red;uchar green;uchar blue;");
+  header.sigma = take("float sigma;");
   // Counts beyond the file's size would overflow the sums below.
   if (header.vertices > bytes.size() || header.triangles > bytes.size()) return std::nullopt;
   const bool faces = take("list uchar int vertex_indices;");
@@ -94,6 +95,7 @@ TriangleMesh read_ply(const std::filesystem::path& file) {
     check(mesh.vertices.back().allFinite(), "{}: vertex {} is not finite", file.string(), v);
     if (header->normals) mesh.normals.push_back(take3<float, Vec3f>(at));
     if (header->colors) mesh.colors.push_back(take3<unsigned char, Vec3f>(at) / 255.0f);
+    if (header->sigma) mesh.sigma.push_back(take<float>(at));
   }
   const auto last = static_cast<std::int64_t>(header->vertices) - 1;
   for (std::size_t t = 0; t < header->triangles; ++t) {

@@ -27,6 +27,7 @@ TriangleMesh part_of(const TriangleMesh& mesh, const std::vector<int>& vertices)
     part.vertices.push_back(mesh.vertices[v]);
     if (!mesh.normals.empty()) part.normals.push_back(mesh.normals[v]);
     if (!mesh.colors.empty()) part.colors.push_back(mesh.colors[v]);
+    if (!mesh.sigma.empty()) part.sigma.push_back(mesh.sigma[v]);
   }
   for (const Vec3i& t : mesh.triangles) {
     const Vec3i corners(renumbered[t[0]], renumbered[t[1]], renumbered[t[2]]);

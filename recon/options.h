@@ -85,8 +85,8 @@ struct RevisitOptions {
 /// Of `dense`: its map.
 struct DenseOptions {
   int width_px = 400;              // of a depth map, at most; it shows all that the lens sees
-  int max_depth_maps = 100;        // key frames that get one; bounds time and memory
-  int depth_maps_a_point = 4;      // wanted: each sparse point in so many of them
+  int max_depth_maps = 200;        // key frames that get one; bounds time and memory
+  int depth_maps_a_point = 8;      // wanted: each sparse point in so many of them
   int views = 8;                   // other key frames each is compared with
   int window_radius_px = 4;        // of the correlation, in the depth map's pixels
   double min_score = 0.45;         // correlation of a depth that is believed

@@ -17,10 +17,11 @@ Stages::Stages()
       }),
       structure([](const FrameSource& frames, const std::vector<int>& keyframes,
                    std::vector<Track> tracks, const ReconOptions& options, Progress& progress) {
+        const bool linked = options.method == "dense" && options.revisits.rounds > 0;
         Structure found =
-            build_structure(keyframes, std::move(tracks), frames.lens(), options.bundle, progress);
-        if (options.method == "dense")
-          link_revisits(frames, options.revisits, options.bundle, found, progress);
+            build_structure(keyframes, std::move(tracks), frames.lens(), options.bundle,
+                            linked ? kDraftAdjustment : kFinalAdjustment, progress);
+        if (linked) link_revisits(frames, options.revisits, options.bundle, found, progress);
         return found;
       }),
       resect([](const FrameSource& frames, const Structure& structure, const ReconOptions& options,

@@ -17,8 +17,6 @@ constexpr int kMinJoiningPoints = 12;        // points that two segments share
 constexpr double kJoiningShare = 0.5;        // of them must agree
 constexpr double kJoiningDepthShare = 0.05;  // to this share of their distance from the camera
 constexpr int kJoinRounds = 10;              // of fitting and rejecting
-constexpr int kFinalRounds = 3;
-constexpr double kFinalTolerance = 1e-7;
 
 // One segment as it was grown: poses and points of its own world.
 struct Segment {
@@ -187,15 +185,16 @@ void settle_structure(Structure& s, double focal_px) {
 }
 
 void finish_structure(Structure& s, const Lens& lens, const BundleOptions& options,
-                      Progress& progress) {
+                      const Adjustment& adjustment, Progress& progress) {
   progress.begin("bundle adjustment");
-  adjust_all(s, lens.fx, options, kFinalRounds, kFinalTolerance);
+  adjust_all(s, lens.fx, options, adjustment.rounds, adjustment.function_tolerance);
   settle_structure(s, lens.fx);
   progress.end(fmt::format("{} points, {:.3f} px", s.tracks.size(), s.mean_reprojection_px));
 }
 
 Structure build_structure(const std::vector<int>& frames, std::vector<Track> tracks,
-                          const Lens& lens, const BundleOptions& options, Progress& progress) {
+                          const Lens& lens, const BundleOptions& options,
+                          const Adjustment& adjustment, Progress& progress) {
   const double focal_px = lens.fx;
   const std::size_t n = frames.size();
   Structure s;
@@ -220,7 +219,7 @@ Structure build_structure(const std::vector<int>& frames, std::vector<Track> tra
     s.tracks[t].triangulated = whole.has_point[t] != 0;
   }
   progress.end(fmt::format("{} of {} key frames, {} segments", s.placed_count(), n, segment_count));
-  finish_structure(s, lens, options, progress);
+  finish_structure(s, lens, options, adjustment, progress);
   return s;
 }
 

@@ -39,6 +39,15 @@ struct Structure {
   int placed_count() const;
 };
 
+/// How far the joint adjustment of all goes.
+struct Adjustment {
+  int rounds;                 // between which the observations are judged anew
+  double function_tolerance;  // relative change of the cost at which a round ends
+};
+inline constexpr Adjustment kFinalAdjustment{3, 1e-7};
+/// For poses that only lead to more observations and are adjusted again with them.
+inline constexpr Adjustment kDraftAdjustment{1, 1e-5};
+
 /// Rays of all observations from their pixels; an observation the lens has no ray for is removed.
 void set_rays(std::vector<Track>& tracks, const Lens& lens);
 
@@ -48,12 +57,13 @@ void set_rays(std::vector<Track>& tracks, const Lens& lens);
 /// cannot be joined the largest is returned: key frames of the others are not placed. Throws
 /// nothing for hopeless input: then no key frame is placed.
 Structure build_structure(const std::vector<int>& frames, std::vector<Track> tracks,
-                          const Lens& lens, const BundleOptions& options, Progress& progress);
+                          const Lens& lens, const BundleOptions& options,
+                          const Adjustment& adjustment, Progress& progress);
 
-/// The joint adjustment over all placed key frames, in rounds between which the observations are
-/// judged; what does not agree is removed, the structure is normalised, and its numbers are set.
+/// The joint adjustment over all placed key frames; what does not agree is removed, the structure
+/// is normalised, and its numbers are set.
 void finish_structure(Structure& structure, const Lens& lens, const BundleOptions& options,
-                      Progress& progress);
+                      const Adjustment& adjustment, Progress& progress);
 
 /// The end of the above without adjusting: for poses that are not to be moved.
 void settle_structure(Structure& structure, double focal_px);

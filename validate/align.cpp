@@ -40,6 +40,7 @@ std::optional<Sim3> align_tracks(const TrackPair& pair, Alignment alignment) {
 TriangleMesh transformed(const TriangleMesh& mesh, const Sim3& target_from_mesh) {
   TriangleMesh moved = mesh;
   for (Vec3& vertex : moved.vertices) vertex = target_from_mesh * vertex;
+  for (float& sigma : moved.sigma) sigma *= static_cast<float>(target_from_mesh.scale);
   const Eigen::Quaternionf turn = target_from_mesh.rotation.cast<float>();
   for (Vec3f& normal : moved.normals) normal = turn * normal;
   return moved;

@@ -73,6 +73,11 @@ json surface_json(const std::optional<SurfaceError>& error) {
     out["recall_" + place] = at.recall;
     out["f_" + place] = at.f;
   }
+  if (error->sigma)
+    out["sigma"] = {{"within_1", error->sigma->within_1},
+                    {"within_2", error->sigma->within_2},
+                    {"median_error_over_sigma", error->sigma->median_ratio},
+                    {"median_mm", error->sigma->median_sigma_mm}};
   return out;
 }
 

@@ -16,6 +16,25 @@ double share_within(const std::vector<double>& distances, double threshold) {
   return static_cast<double>(within) / static_cast<double>(distances.size());
 }
 
+// At most `most` of the vertices, evenly over their order.
+SigmaError sigma_error(const TriangleMesh& estimate, const ClosestPoint& truth, std::size_t most) {
+  const std::size_t stride = 1 + estimate.vertices.size() / most;
+  std::vector<Vec3> places;
+  std::vector<double> sigmas;
+  for (std::size_t v = 0; v < estimate.vertices.size(); v += stride) {
+    places.push_back(estimate.vertices[v]);
+    sigmas.push_back(estimate.sigma[v]);
+  }
+  std::vector<double> ratios = distances_mm(places, truth);
+  for (std::size_t i = 0; i < ratios.size(); ++i) ratios[i] /= sigmas[i];
+  SigmaError error;
+  error.within_1 = share_within(ratios, 1.0);
+  error.within_2 = share_within(ratios, 2.0);
+  error.median_ratio = error_stats(ratios).median;
+  error.median_sigma_mm = error_stats(sigmas).median;
+  return error;
+}
+
 }  // namespace
 
 void SurfaceOptions::check() const {
@@ -95,6 +114,8 @@ std::optional<SurfaceError> TrueSurface::error_of(const TriangleMesh& estimate) 
     at.f = sum > 0.0 ? 2.0 * at.precision * at.recall / sum : 0.0;
     error.at.push_back(at);
   }
+  if (!estimate.sigma.empty() && estimate.sigma.size() == estimate.vertices.size())
+    error.sigma = sigma_error(estimate, *closest_, options_.samples);
   return error;
 }
 

@@ -35,12 +35,22 @@ struct SurfaceOptions {
   void check() const;
 };
 
+/// What a map says of its own error against what it is: with errors as the map's sigma claims,
+/// normally distributed, 0.683 and 0.954 of the vertices are within one and two sigma, and the
+/// median of error over sigma is 0.674.
+struct SigmaError {
+  double within_1 = 0.0, within_2 = 0.0;  // shares of the vertices
+  double median_ratio = 0.0;              // of error over sigma
+  double median_sigma_mm = 0.0;
+};
+
 struct SurfaceError {
   ErrorStats estimate_to_truth_mm;  // accuracy
   ErrorStats truth_to_estimate_mm;  // completeness
   // Chamfer distances: the mean of both directions' means, and of their medians.
   double chamfer_mean_mm = 0.0, chamfer_median_mm = 0.0;
   std::vector<Thresholded> at;
+  std::optional<SigmaError> sigma;  // of an estimate that has them
 };
 
 /// The true surface, prepared once for many estimates. Keeps a reference to the mesh.

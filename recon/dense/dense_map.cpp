@@ -96,9 +96,9 @@ double median(std::vector<float>& values) {
   return *middle;
 }
 
-DistanceVolume::Surface fuse(const WideFrames& frames, const Structure& structure,
-                             const std::vector<StereoSet>& sets, const std::vector<DepthMap>& maps,
-                             double voxel, Progress& progress) {
+TriangleMesh fuse(const WideFrames& frames, const Structure& structure,
+                  const std::vector<StereoSet>& sets, const std::vector<DepthMap>& maps,
+                  double voxel, Progress& progress) {
   progress.begin("fusion", maps.size());
   DistanceVolume volume(voxel);
   for (std::size_t begin = 0; begin < maps.size(); begin += kAtOnce) {
@@ -149,11 +149,9 @@ DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
                            100.0 * result.depth_share, maps.size(), result.median_sigma));
   if (widths.empty()) return result;
 
-  DistanceVolume::Surface surface =
+  const TriangleMesh surface =
       fuse(wide, structure, sets, maps, options.voxel_px * median(widths), progress);
-  const std::vector<int> kept = vertices_of_large_pieces(surface.mesh, kSmallestPiece);
-  for (const int v : kept) result.sigma.push_back(surface.sigma[v]);
-  result.mesh = part_of(surface.mesh, kept);
+  result.mesh = part_of(surface, vertices_of_large_pieces(surface, kSmallestPiece));
   to_display(result.mesh.colors);
   result.mesh.normals = angle_weighted_normals(result.mesh);
   progress.end(fmt::format("{} triangles", result.mesh.triangles.size()));

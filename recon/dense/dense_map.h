@@ -14,9 +14,8 @@ namespace rugae {
 
 struct DenseMap {
   /// World of the structure, map units; geometric normals point away from the cameras; colours are
-  /// the wall's own (albedo up to one gain).
+  /// the wall's own (albedo up to one gain); each vertex has its sigma.
   TriangleMesh mesh;
-  std::vector<float> sigma;  // of each vertex along its normal, map units
   int depth_maps = 0;
   double depth_share = 0.0;   // of their pixels have a depth that others agree with
   double median_sigma = 0.0;  // of these depths, over the depth

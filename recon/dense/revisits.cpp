@@ -177,7 +177,8 @@ void link_revisits(const FrameSource& frames, const RevisitOptions& options,
     progress.end(fmt::format(
         "{} patches, {} sights registered, {} looked for, {} found, {} accepted", report.patches,
         report.registered, report.foretold, report.found, report.accepted));
-    finish_structure(structure, frames.lens(), bundle, progress);
+    finish_structure(structure, frames.lens(), bundle,
+                     round + 1 < options.rounds ? kDraftAdjustment : kFinalAdjustment, progress);
   }
 }
 

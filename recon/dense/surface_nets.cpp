@@ -15,7 +15,7 @@ class SurfaceNets {
     std::ranges::sort(keys_);
   }
 
-  DistanceVolume::Surface surface() {
+  TriangleMesh surface() {
     // Cells begin at a voxel of a block that exists; vertices first, then the faces between them.
     for (const std::uint64_t key : keys_) for_voxels(key, [&](const Vec3i& v) { add_vertex(v); });
     for (const std::uint64_t key : keys_) for_voxels(key, [&](const Vec3i& v) { add_faces(v); });
@@ -67,7 +67,7 @@ class SurfaceNets {
     if (inside == 0 || inside == 8) return;
     Vec3 place = Vec3::Zero();
     Vec3f colour = Vec3f::Zero();
-    float weight = 0.0f, colour_weight = 0.0f;
+    float weight = 0.0f, roots = 0.0f, colour_weight = 0.0f;
     int cuts = 0;
     for (int a = 0; a < 8; ++a)
       for (int axis = 0; axis < 3; ++axis) {
@@ -79,6 +79,7 @@ class SurfaceNets {
         place += corner(a).cast<double>() +
                  static_cast<double>(t) * (corner(b) - corner(a)).cast<double>();
         weight += (1.0f - t) * corners[a]->weight + t * corners[b]->weight;
+        roots += (1.0f - t) * corners[a]->roots + t * corners[b]->roots;
         for (const auto& [voxel, share] : {std::pair(corners[a], 1.0f - t), {corners[b], t}}) {
           const float w = share * voxel->colour_weight;
           colour += w * Vec3f(voxel->colour[0], voxel->colour[1], voxel->colour[2]);
@@ -86,12 +87,10 @@ class SurfaceNets {
         }
         ++cuts;
       }
-    vertex_of_[cell_key(cell)] = static_cast<int>(surface_.mesh.vertices.size());
-    surface_.mesh.vertices.push_back(volume_.voxel_ * (cell.cast<double>() + place / cuts));
-    surface_.mesh.colors.push_back(colour_weight > 0.0f ? Vec3f(colour / colour_weight)
-                                                        : Vec3f::Zero());
-    surface_.sigma.push_back(static_cast<float>(volume_.voxel_) /
-                             std::sqrt(weight / static_cast<float>(cuts)));
+    vertex_of_[cell_key(cell)] = static_cast<int>(surface_.vertices.size());
+    surface_.vertices.push_back(volume_.voxel_ * (cell.cast<double>() + place / cuts));
+    surface_.colors.push_back(colour_weight > 0.0f ? Vec3f(colour / colour_weight) : Vec3f::Zero());
+    surface_.sigma.push_back(static_cast<float>(volume_.voxel_) * roots / weight);
   }
 
   /// The faces around the three edges that begin at this voxel.
@@ -109,14 +108,14 @@ class SurfaceNets {
       // Their winding looks along the axis: outward when the cameras' side comes first.
       auto [a, b, c, d] = corner_vertices;
       if (!(here->distance > 0.0f)) std::swap(b, d);
-      const auto& p = surface_.mesh.vertices;
+      const auto& p = surface_.vertices;
       // Cut along the shorter diagonal.
       if ((p[a] - p[c]).squaredNorm() <= (p[b] - p[d]).squaredNorm()) {
-        surface_.mesh.triangles.emplace_back(a, b, c);
-        surface_.mesh.triangles.emplace_back(a, c, d);
+        surface_.triangles.emplace_back(a, b, c);
+        surface_.triangles.emplace_back(a, c, d);
       } else {
-        surface_.mesh.triangles.emplace_back(a, b, d);
-        surface_.mesh.triangles.emplace_back(b, c, d);
+        surface_.triangles.emplace_back(a, b, d);
+        surface_.triangles.emplace_back(b, c, d);
       }
     }
   }
@@ -136,9 +135,9 @@ class SurfaceNets {
   std::uint64_t last_key_ = ~std::uint64_t{0};
   const DistanceVolume::Block* last_ = nullptr;
   std::unordered_map<std::uint64_t, int> vertex_of_;
-  DistanceVolume::Surface surface_;
+  TriangleMesh surface_;
 };
 
-DistanceVolume::Surface DistanceVolume::extract() const { return SurfaceNets(*this).surface(); }
+TriangleMesh DistanceVolume::extract() const { return SurfaceNets(*this).surface(); }
 
 }  // namespace rugae

@@ -165,6 +165,7 @@ void DistanceVolume::update(const View& view, std::uint64_t key, Block& block) c
         const float weight = view.weight.at<float>(py, px);
         const auto held = static_cast<float>(std::min(distance, kTruncationVoxels));
         voxel.weight += weight;
+        voxel.roots += std::sqrt(weight);
         voxel.distance += weight / voxel.weight * (held - voxel.distance);
         if (view.colours.empty()) continue;
         const auto& colour = view.colours.at<cv::Vec3f>(py, px);

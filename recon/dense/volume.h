@@ -31,24 +31,20 @@ class DistanceVolume {
   /// seen more obliquely than 80 degrees is left out.
   void integrate(const DepthMap& map, const cv::Mat& colours);
 
-  struct Surface {
-    /// Geometric normals point away from the cameras; colours as integrated, 0 where there were
-    /// none.
-    TriangleMesh mesh;
-    /// Standard deviation of each vertex along its normal, as if the errors of the depth maps were
-    /// independent.
-    std::vector<float> sigma;
-  };
   /// Surface nets (Gibson, MICCAI 1998, doi:10.1007/BFb0056277): a vertex a voxel that the wall
   /// passes through, at the mean of where it cuts the voxel's edges. Does not depend on the order
-  /// in which blocks came to be.
-  Surface extract() const;
+  /// in which blocks came to be. Geometric normals point away from the cameras; colours as
+  /// integrated, 0 where there were none. Sigma as if all depth maps erred alike, the worst case
+  /// and nearly the true one (they share frames, poses and windows): sum of w sigma over sum of w,
+  /// with w = 1 / sigma^2.
+  TriangleMesh extract() const;
 
  private:
   static constexpr int kSide = 8;  // voxels of a block, each way
   struct Voxel {
     float distance = 0.0f;  // from the wall, voxels; positive on the cameras' side
     float weight = 0.0f;    // sum of voxel^2 / sigma^2
+    float roots = 0.0f;     // sum of voxel / sigma
     float colour_weight = 0.0f;
     std::array<float, 3> colour{};
   };

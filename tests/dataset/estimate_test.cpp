@@ -30,6 +30,7 @@ Estimate example() {
   estimate.map.vertices = {Vec3(0, 0, 1), Vec3(1, 0, 1), Vec3(0, 1.5, 1.25)};
   estimate.map.triangles = {{0, 1, 2}};
   estimate.map.colors = {Vec3f(1, 0, 0), Vec3f(0, 1, 0), Vec3f(0, 0, 1)};
+  estimate.map.sigma = {0.25f, 0.5f, 1.0f};
   estimate.points = {Vec3(0.1, 0.2, 0.3), Vec3(-1e-9, 1e9, 1.0 / 3.0)};
   estimate.stages = {{"keyframes", 1.25, 100.0}, {"bundle", 2.5, 120.5}};
   estimate.numbers = {
@@ -58,6 +59,7 @@ TEST(Estimate, RoundTrip) {
   EXPECT_EQ(a.lens.p1, b.lens.p1);
   EXPECT_EQ(a.map.vertices, b.map.vertices);  // the example's are floats
   EXPECT_EQ(a.map.triangles, b.map.triangles);
+  EXPECT_EQ(a.map.sigma, b.map.sigma);
   EXPECT_EQ(a.map.colors, b.map.colors);
   EXPECT_EQ(a.points, b.points);
   ASSERT_EQ(b.stages.size(), 2u);
@@ -141,7 +143,7 @@ TEST(Estimate, ATruncatedMapIsNamed) {
   const EstimateLayout layout{folder.path()};
   fs::resize_file(layout.map_ply(), fs::file_size(layout.map_ply()) - 5);
   EXPECT_EQ(error_of([&] { read_estimate(folder.path()); }),
-            layout.map_ply().string() + ": truncated or damaged: 53 bytes of data, expected 58");
+            layout.map_ply().string() + ": truncated or damaged: 65 bytes of data, expected 70");
   write_atomic(layout.map_ply(), "solid cube");
   EXPECT_EQ(error_of([&] { read_estimate(folder.path()); }),
             layout.map_ply().string() + ": not a binary PLY of this program");

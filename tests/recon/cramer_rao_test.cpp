@@ -90,8 +90,8 @@ constexpr double kOverTheBound = 1.5;
 TEST_P(CramerRao, NoisyTracksComeNearTheBound) {
   const synthetic::World world = synthetic::make_world({.noise_px = kNoisePx, .seed = GetParam()});
   Progress progress(Progress::Output::silent);
-  const Structure s =
-      build_structure(world.frames, world.tracks, world.lens, BundleOptions{}, progress);
+  const Structure s = build_structure(world.frames, world.tracks, world.lens, BundleOptions{},
+                                      kFinalAdjustment, progress);
   ASSERT_EQ(s.placed_count(), static_cast<int>(world.frames.size()));
   std::vector<Vec3> ours, truth;
   for (std::size_t k = 0; k < world.frames.size(); ++k) {

@@ -84,10 +84,10 @@ TEST_F(DenseMapOfFrames, IsTheWallAndTheSameForAnyNumberOfThreads) {
   ASSERT_GE(map.mesh.vertices.size(), 1000u);
   ASSERT_EQ(map.mesh.colors.size(), map.mesh.vertices.size());
   ASSERT_EQ(map.mesh.normals.size(), map.mesh.vertices.size());
-  ASSERT_EQ(map.sigma.size(), map.mesh.vertices.size());
+  ASSERT_EQ(map.mesh.sigma.size(), map.mesh.vertices.size());
   std::vector<double> errors;
   int outward = 0;
-  for (std::size_t v = 0; v < map.sigma.size(); ++v) {
+  for (std::size_t v = 0; v < map.mesh.sigma.size(); ++v) {
     const Vec3& p = map.mesh.vertices[v];
     errors.push_back(std::abs(p.norm() - synthetic::wall_radius_mm(p.normalized())));
     outward += map.mesh.normals[v].cast<double>().dot(p) > 0.0 ? 1 : 0;
@@ -96,14 +96,14 @@ TEST_F(DenseMapOfFrames, IsTheWallAndTheSameForAnyNumberOfThreads) {
   // The wall is some 40 mm off: a quarter of a percent.
   EXPECT_LE(errors[errors.size() / 2], 0.1);
   EXPECT_LE(errors[errors.size() * 9 / 10], 0.4);
-  EXPECT_GE(outward, 0.99 * static_cast<double>(map.sigma.size()));
+  EXPECT_GE(outward, 0.99 * static_cast<double>(map.mesh.sigma.size()));
 
   const DenseMap again = build(2);
   ASSERT_EQ(again.mesh.vertices.size(), map.mesh.vertices.size());
-  for (std::size_t v = 0; v < map.sigma.size(); ++v) {
+  for (std::size_t v = 0; v < map.mesh.sigma.size(); ++v) {
     ASSERT_TRUE(again.mesh.vertices[v] == map.mesh.vertices[v]);
     ASSERT_TRUE(again.mesh.colors[v] == map.mesh.colors[v]);
-    ASSERT_TRUE(again.sigma[v] == map.sigma[v]);
+    ASSERT_TRUE(again.mesh.sigma[v] == map.mesh.sigma[v]);
   }
   ASSERT_TRUE(again.mesh.triangles == map.mesh.triangles);
 }

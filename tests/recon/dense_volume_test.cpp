@@ -37,7 +37,7 @@ std::vector<Rigid3> six_views(double scale) {
   return views;
 }
 
-DistanceVolume::Surface sphere_from_inside(double scale) {
+TriangleMesh sphere_from_inside(double scale) {
   DistanceVolume volume(scale * 1.0);
   for (const Rigid3& view : six_views(scale))
     volume.integrate(
@@ -47,37 +47,37 @@ DistanceVolume::Surface sphere_from_inside(double scale) {
 }
 
 // Two maps that differ: w = 1/0.1^2 and 1/0.2^2, so the mean is 50 + 0.4 * 25 / 125 = 50.08, and
-// its sigma 1 / sqrt(125).
+// its sigma, the maps erring alike, (10 + 5) / 125.
 TEST(DenseVolume, TheWallIsTheMeanWeightedByCertainty) {
   DistanceVolume volume(0.8);
   volume.integrate(exact_map(plane_wall(Vec3::UnitZ(), 50.0), {}, 0.1f), {});
   volume.integrate(exact_map(plane_wall(Vec3::UnitZ(), 50.4), {}, 0.2f), {});
   const auto surface = volume.extract();
-  ASSERT_GE(surface.mesh.vertices.size(), 1000u);
-  ASSERT_EQ(surface.sigma.size(), surface.mesh.vertices.size());
+  ASSERT_GE(surface.vertices.size(), 1000u);
+  ASSERT_EQ(surface.sigma.size(), surface.vertices.size());
   int inner = 0;
   for (std::size_t v = 0; v < surface.sigma.size(); ++v) {
-    const Vec3& p = surface.mesh.vertices[v];
+    const Vec3& p = surface.vertices[v];
     if (std::abs(p.x()) > 40.0 || std::abs(p.y()) > 30.0) continue;  // the rim of the pictures
     ++inner;
     ASSERT_NEAR(p.z(), 50.08, 1e-3);
-    ASSERT_NEAR(surface.sigma[v], 1.0 / std::sqrt(125.0), 1e-3);
+    ASSERT_NEAR(surface.sigma[v], 15.0 / 125.0, 1e-3);
   }
   EXPECT_GE(inner, 1000);
 }
 
 TEST(DenseVolume, InsideOfASphereComesBackRoundAndPointsOutward) {
   const auto surface = sphere_from_inside(1.0);
-  ASSERT_FALSE(surface.mesh.empty());
-  check_mesh(surface.mesh, "sphere");
+  ASSERT_FALSE(surface.empty());
+  check_mesh(surface, "sphere");
   double square = 0.0;
-  for (const Vec3& p : surface.mesh.vertices) square += std::pow(p.norm() - 30.0, 2);
+  for (const Vec3& p : surface.vertices) square += std::pow(p.norm() - 30.0, 2);
   // A chord of a voxel's side, 1 mm, is 1 / (8 * 30) = 0.004 mm off; steps between pixels add to
   // that. A hundredth of a voxel is not missed by more than two.
-  EXPECT_LE(std::sqrt(square / static_cast<double>(surface.mesh.vertices.size())), 0.02);
+  EXPECT_LE(std::sqrt(square / static_cast<double>(surface.vertices.size())), 0.02);
   const double volume = 4.0 / 3.0 * kPi * std::pow(30.0, 3);
-  EXPECT_NEAR(signed_volume_mm3(surface.mesh), volume, 0.01 * volume);
-  const EdgeReport edges = inspect_edges(surface.mesh);
+  EXPECT_NEAR(signed_volume_mm3(surface), volume, 0.01 * volume);
+  const EdgeReport edges = inspect_edges(surface);
   EXPECT_EQ(edges.flipped, 0u);
   EXPECT_EQ(edges.open, 0u);
 }
@@ -89,9 +89,9 @@ TEST(DenseVolume, AnObliqueWallIsWhereItIs) {
   DistanceVolume volume(0.8);
   volume.integrate(exact_map(wall, {}, 0.1f), {});
   const auto surface = volume.extract();
-  ASSERT_GE(surface.mesh.vertices.size(), 500u);
+  ASSERT_GE(surface.vertices.size(), 500u);
   int near = 0;
-  for (const Vec3& p : surface.mesh.vertices) {
+  for (const Vec3& p : surface.vertices) {
     // Farther off the depths of neighbouring pixels are voxels apart.
     if (p.norm() > 50.0) continue;
     ++near;
@@ -103,10 +103,10 @@ TEST(DenseVolume, AnObliqueWallIsWhereItIs) {
 TEST(DenseVolume, ScalingTheWorldScalesTheSurfaceOnly) {
   constexpr double kScale = 1024.0;  // a power of two: exact in floating point
   const auto a = sphere_from_inside(1.0), b = sphere_from_inside(kScale);
-  ASSERT_EQ(a.mesh.vertices.size(), b.mesh.vertices.size());
-  ASSERT_EQ(a.mesh.triangles.size(), b.mesh.triangles.size());
+  ASSERT_EQ(a.vertices.size(), b.vertices.size());
+  ASSERT_EQ(a.triangles.size(), b.triangles.size());
   for (std::size_t v = 0; v < a.sigma.size(); ++v) {
-    ASSERT_LE((b.mesh.vertices[v] / kScale - a.mesh.vertices[v]).norm(), 1e-4);
+    ASSERT_LE((b.vertices[v] / kScale - a.vertices[v]).norm(), 1e-4);
     ASSERT_NEAR(b.sigma[v] / kScale, a.sigma[v], 1e-4 * a.sigma[v]);
   }
 }
@@ -117,21 +117,21 @@ TEST(DenseVolume, OneThreadAndTwoGiveTheSameBytes) {
     return sphere_from_inside(1.0);
   };
   const auto a = run(1), b = run(2);
-  ASSERT_EQ(a.mesh.vertices.size(), b.mesh.vertices.size());
+  ASSERT_EQ(a.vertices.size(), b.vertices.size());
   for (std::size_t v = 0; v < a.sigma.size(); ++v) {
-    ASSERT_TRUE(a.mesh.vertices[v] == b.mesh.vertices[v]);
+    ASSERT_TRUE(a.vertices[v] == b.vertices[v]);
     ASSERT_TRUE(a.sigma[v] == b.sigma[v]);
   }
-  ASSERT_TRUE(a.mesh.triangles == b.mesh.triangles);
+  ASSERT_TRUE(a.triangles == b.triangles);
 }
 
 TEST(DenseVolume, NothingMakesNothing) {
   DistanceVolume volume(1.0);
-  EXPECT_TRUE(volume.extract().mesh.empty());
+  EXPECT_TRUE(volume.extract().empty());
   DepthMap unknown = exact_map(plane_wall(Vec3::UnitZ(), 50.0), {}, 0.1f);
   unknown.depth.setTo(std::nanf(""));
   volume.integrate(unknown, {});
-  EXPECT_TRUE(volume.extract().mesh.empty());
+  EXPECT_TRUE(volume.extract().empty());
 }
 
 // --- Colour ----------------------------------------------------------------------------------

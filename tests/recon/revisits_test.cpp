@@ -49,7 +49,8 @@ class Revisits : public testing::Test {
       world_.tracks.insert(world_.tracks.end(), more.tracks.begin(), more.tracks.end());
     }
     Progress progress(Progress::Output::silent);
-    chain_ = build_structure(world_.frames, world_.tracks, world_.lens, BundleOptions{}, progress);
+    chain_ = build_structure(world_.frames, world_.tracks, world_.lens, BundleOptions{},
+                             kFinalAdjustment, progress);
   }
   static void TearDownTestSuite() { fs::remove_all(root_); }
 

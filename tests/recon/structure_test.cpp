@@ -20,7 +20,8 @@ using synthetic::World;
 
 Structure build(const World& world) {
   Progress progress(Progress::Output::silent);
-  return build_structure(world.frames, world.tracks, world.lens, BundleOptions{}, progress);
+  return build_structure(world.frames, world.tracks, world.lens, BundleOptions{}, kFinalAdjustment,
+                         progress);
 }
 
 // What the problem demands of exact tracks: 1e-6 of the path's extent.

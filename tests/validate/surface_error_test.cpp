@@ -48,6 +48,25 @@ TEST(SurfaceError, HalfAMapIsAccurateAndHalfComplete) {
   EXPECT_NEAR(error->truth_to_estimate_mm.mean, 5.0, 0.02);  // half at 0, half uniform in 0..20
 }
 
+TEST(SurfaceError, SigmaIsHeldAgainstTheError) {
+  // Vertices 1 mm off: half of them say 0.4 mm, two and a half sigma; the others 0.8 mm.
+  TriangleMesh map = shapes::plane(40, 40, 4, 1.0);
+  EXPECT_FALSE(surface_error(map, shapes::plane(40, 40, 4, 0.0), kFew)->sigma);
+  for (std::size_t v = 0; v < map.vertices.size(); ++v) map.sigma.push_back(v % 2 ? 0.4f : 0.8f);
+  const auto here = surface_error(map, shapes::plane(40, 40, 4, 0.0), kFew);
+  ASSERT_TRUE(here->sigma);
+  const auto n = static_cast<double>(map.vertices.size());
+  EXPECT_EQ(here->sigma->within_1, 0.0);
+  EXPECT_EQ(here->sigma->within_2, std::ceil(n / 2.0) / n);
+  EXPECT_NEAR(here->sigma->median_ratio, 1.25, 1e-6);
+  EXPECT_NEAR(here->sigma->median_sigma_mm, 0.8, 1e-6);
+  // A map in metres with its sigma in metres.
+  const Sim3 metres{1e-3, Quat::Identity(), Vec3::Zero()};
+  const auto there = surface_error(transformed(transformed(map, metres), metres.inverse()),
+                                   shapes::plane(40, 40, 4, 0.0), kFew);
+  EXPECT_NEAR(there->sigma->median_ratio, 1.25, 1e-5);
+}
+
 TEST(SurfaceError, NoSurfaceIsEmpty) {
   EXPECT_FALSE(surface_error({}, shapes::plane(4, 4, 1, 0), kFew));
   EXPECT_FALSE(surface_error(shapes::plane(4, 4, 1, 0), {}, kFew));
