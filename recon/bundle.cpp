@@ -106,11 +106,13 @@ BundleReport bundle_adjust(Structure& structure, double focal_px, const BundleOp
   for (SchurProblem::Point& point : problem.points)
     for (auto& o : point.observations) o.camera = camera_of[o.camera];
 
-  const SchurReport found = minimise(problem, {scope.max_iterations, scope.function_tolerance});
+  const SchurReport found =
+      minimise(problem, {scope.max_iterations, scope.function_tolerance, scope.radius});
   report.initial_cost = found.initial_cost;
   report.final_cost = found.final_cost;
   report.iterations = found.iterations;
   report.converged = found.converged;
+  report.radius = found.radius;
   for (std::size_t c = 0; c < keyframe_of.size(); ++c)
     structure.cam_from_world[keyframe_of[c]] = problem.cam_from_world[c];
   for (std::size_t i = 0; i < adjusted.size(); ++i) adjusted[i]->point = problem.points[i].position;

@@ -14,6 +14,7 @@ struct BundleReport {
   int iterations = 0;
   int residuals = 0;  // observations
   bool converged = false;
+  double radius = 0.0;  // of the damping, after the last step
 };
 
 /// What to adjust, and how far.
@@ -21,6 +22,7 @@ struct BundleScope {
   std::vector<int> free_keyframes;  // empty: all that are placed, the first of them held
   int max_iterations = 50;
   double function_tolerance = 1e-6;  // relative change of the cost at which to stop
+  double radius = 1e4;               // of the damping, at the first step
 };
 
 /// Adjusts the placed key frames of the scope and every triangulated point they see (schur.h, Huber

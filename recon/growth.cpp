@@ -229,13 +229,14 @@ void update_points(Structure& structure, double focal_px, double max_px,
 void adjust_all(Structure& structure, double focal_px, const BundleOptions& options, int rounds,
                 double function_tolerance) {
   const double max_px = kOutlierHubers * options.huber_px;
+  BundleScope scope;
+  scope.max_iterations = options.max_iterations;
+  scope.function_tolerance = function_tolerance;
   for (int round = 0; round < rounds; ++round) {
-    BundleScope scope;
-    scope.max_iterations = options.max_iterations;
-    scope.function_tolerance = function_tolerance;
     const BundleReport report = bundle_adjust(structure, focal_px, options, scope);
     structure.iterations = report.iterations;
     structure.converged = report.converged;
+    scope.radius = report.radius;  // the next round begins where this one ended
     update_points(structure, focal_px, max_px, options);
   }
 }

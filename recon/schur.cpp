@@ -12,7 +12,7 @@
 namespace rugae {
 namespace {
 
-constexpr double kFirstRadius = 1e4, kLargestRadius = 1e16, kSmallestRadius = 1e-32;
+constexpr double kLargestRadius = 1e16, kSmallestRadius = 1e-32;
 constexpr double kMinDiagonal = 1e-6, kMaxDiagonal = 1e32;  // of what the damping scales with
 constexpr double kMinQuality = 1e-3;           // of the gain that the quadratic model promises
 constexpr double kParameterTolerance = 1e-14;  // relative step: nothing moves any more
@@ -279,7 +279,7 @@ SchurReport Solver::run(const SchurOptions& options) {
   double cost = cost_of(problem_, cameras, positions, parts_);
   report.initial_cost = report.final_cost = cost;
   if (!std::isfinite(cost)) return report;
-  double radius = kFirstRadius, shrink = 2.0;
+  double radius = options.radius, shrink = 2.0;
   int refused = 0;
   bool moved = true;
   Eigen::VectorXd camera_step;
@@ -344,6 +344,7 @@ SchurReport Solver::run(const SchurOptions& options) {
     }
   }
   report.final_cost = cost;
+  report.radius = radius;
   return report;
 }
 

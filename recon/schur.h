@@ -27,12 +27,14 @@ struct SchurProblem {
 struct SchurOptions {
   int max_iterations = 50;           // rejected steps count
   double function_tolerance = 1e-6;  // relative change of the cost at which to stop
+  double radius = 1e4;               // of the first step; the damping is its inverse
 };
 
 struct SchurReport {
   double initial_cost = 0.0, final_cost = 0.0;  // infinite: a point is behind a camera
   int iterations = 0;
   bool converged = false;
+  double radius = 0.0;  // after the last step
 };
 
 /// Minimises over free cameras and points
