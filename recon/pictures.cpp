@@ -134,6 +134,42 @@ void draw_tracks(const fs::path& folder, const FrameSource& frames, const Struct
   }
 }
 
+void draw_links(const fs::path& folder, const Structure& structure) {
+  constexpr int kMostPx = 1000;  // of the picture: of more key frames each pixel is several
+  constexpr double kMany = 500;  // shared points: white
+  const auto n = static_cast<int>(structure.frames.size());
+  if (n == 0) return;
+  const int each = (n + kMostPx - 1) / kMostPx, side = (n + each - 1) / each;
+  cv::Mat shared(side, side, CV_32F, cv::Scalar(0.0));
+  for (const Track& track : structure.tracks)
+    for (const auto& a : track.observations)
+      for (const auto& b : track.observations)
+        if (a.keyframe != b.keyframe)
+          shared.at<float>(a.keyframe / each, b.keyframe / each) += 1.0f / static_cast<float>(each);
+  cv::Mat brightness, gray, drawn;
+  cv::log(shared + 1.0f, brightness);
+  brightness.convertTo(gray, CV_8U, 255.0 / std::log1p(kMany));
+  cv::applyColorMap(gray, drawn, cv::COLORMAP_INFERNO);
+  const int enlarged = std::max(1, kMostPx / side);
+  cv::resize(drawn, drawn, {}, enlarged, enlarged, cv::INTER_NEAREST);
+  write_image(stage(folder, "links") / "keyframes.png", drawn);
+}
+
+void draw_depth_maps(const fs::path& folder, const std::vector<DepthExample>& examples,
+                     double max_sigma_share) {
+  const fs::path wide = stage(folder, "wide"), found = stage(folder, "stereo"),
+                 agreed = stage(folder, "agreed"), sigma = stage(folder, "sigma");
+  for (const DepthExample& example : examples) {
+    const std::string name = name_of(example.frame);
+    const double low = quantile(example.found, 0.02), high = quantile(example.found, 0.98);
+    write_image(wide / name, example.picture);
+    write_image(found / name, depth_picture(example.found, low, high));
+    write_image(agreed / name, depth_picture(example.agreed, low, high));
+    write_image(sigma / name,
+                depth_picture(cv::Mat(example.sigma / example.agreed), 0.0, max_sigma_share));
+  }
+}
+
 void draw_mosaics(const fs::path& folder, const std::vector<Mosaic>& mosaics,
                   const std::vector<std::optional<MosaicDepth>>& depths, std::size_t at_most) {
   const fs::path mosaic_folder = stage(folder, "mosaic"), seam_folder = stage(folder, "seams"),

@@ -5,6 +5,7 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
+#include "recon/dense/dense_map.h"
 #include "recon/map.h"
 #include "recon/mosaic.h"
 #include "recon/preprocess/preprocess.h"
@@ -27,6 +28,14 @@ void draw_tracks(const std::filesystem::path& folder, const FrameSource& frames,
 /// mosaic and depth: each mosaic, with the seams drawn in, and its depth.
 void draw_mosaics(const std::filesystem::path& folder, const std::vector<Mosaic>& mosaics,
                   const std::vector<std::optional<MosaicDepth>>& depths, std::size_t at_most);
+
+/// links: for each two key frames, in the order of time, how many points both see (logarithmic,
+/// black for none). A chain is a diagonal; what is off it was seen again.
+void draw_links(const std::filesystem::path& folder, const Structure& structure);
+/// wide, stereo, agreed and sigma: some key frames, their depth as stereo found it, what other
+/// depth maps agree with, and its sigma over the depth, up to `max_sigma_share`.
+void draw_depth_maps(const std::filesystem::path& folder, const std::vector<DepthExample>& examples,
+                     double max_sigma_share);
 
 /// `count` of 0 ... n-1, evenly spread, ascending, without repetition.
 std::vector<int> spread(int n, int count);

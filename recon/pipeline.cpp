@@ -113,9 +113,12 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
   Estimate estimate = estimate_of(frames.observations(), options, motion);
   std::vector<Mosaic> mosaics;
   std::vector<std::optional<MosaicDepth>> depths;
+  std::vector<DepthExample> examples;
   if (options.method == "dense") {
-    add(build_dense_map(frames, structure, options.preprocess.reflections, options.dense, progress),
-        estimate);
+    DenseMap map = build_dense_map(frames, structure, options.preprocess.reflections, options.dense,
+                                   options.pictures ? kPictures : 0, progress);
+    examples = std::move(map.examples);
+    add(std::move(map), estimate);
   } else {
     progress.begin("mosaics");  // algorithm 3, steps 8 to 10
     mosaics = compose_mosaics(frames, structure, motion.pairs, options.mosaic);
@@ -131,7 +134,11 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
     draw_pairs(layout.pictures(), frames, motion.pairs);
     draw_tracks(layout.pictures(), frames, structure,
                 spread(static_cast<int>(structure.frames.size()), kPictures));
-    draw_mosaics(layout.pictures(), mosaics, depths, 2 * kPictures);
+    draw_links(layout.pictures(), structure);
+    if (options.method == "dense")
+      draw_depth_maps(layout.pictures(), examples, options.dense.max_sigma_share);
+    else
+      draw_mosaics(layout.pictures(), mosaics, depths, 2 * kPictures);
   }
   progress.end();
   estimate.stages = motion.stages;

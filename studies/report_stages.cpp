@@ -45,11 +45,22 @@ const std::vector<Group>& groups() {
        "Points followed over several key frames and placed in space by bundle adjustment; blue are "
        "seen by few key frames, red by many.",
        {{"tracks", "placed points"}}},
+      {"Links between key frames",
+       "How many points each two key frames share, in the order of time: a chain is a diagonal, "
+       "what "
+       "is off it was seen again.",
+       {{"links", "bright: many"}}},
+      {"Stereo",
+       "Key frames compared with others around them; a depth counts where other depth maps agree.",
+       {{"wide", "all that the lens sees"},
+        {"stereo", "depth as found: bright near, dark far"},
+        {"agreed", "what others agree with"},
+        {"sigma", "its standard deviation over the depth: bright, little"}}},
       {"Mosaics",
        "Key frames that look the same way, blended into one picture, and its relief from shading.",
        {{"mosaic", "mosaic"},
         {"seams", "with its seams"},
-        {"depth", "depth: red near, blue far"}}}};
+        {"depth", "depth: bright near, dark far"}}}};
   return kGroups;
 }
 

@@ -14,6 +14,7 @@
 #include "recon/dense/view_choice.h"
 #include "recon/dense/volume.h"
 #include "recon/mesh_pieces.h"
+#include "recon/pictures.h"
 
 namespace rugae {
 namespace {
@@ -89,6 +90,21 @@ void keep_consistent(std::vector<DepthMap>& maps, const DenseOptions& options) {
   });
 }
 
+// Some of the depth maps, as they were found.
+std::vector<DepthExample> examples_of(const WideFrames& frames, const Structure& structure,
+                                      const std::vector<StereoSet>& sets,
+                                      const std::vector<DepthMap>& maps,
+                                      const std::vector<int>& which) {
+  std::vector<DepthExample> examples;
+  for (const int i : which) {
+    DepthExample& example = examples.emplace_back();
+    example.frame = structure.frames[sets[i].reference];
+    frames.read(example.frame).bgr.convertTo(example.picture, CV_8U);
+    example.found = maps[i].depth.clone();
+  }
+  return examples;
+}
+
 double median(std::vector<float>& values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -119,7 +135,7 @@ TriangleMesh fuse(const WideFrames& frames, const Structure& structure,
 
 DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
                          const ReflectionOptions& reflections, const DenseOptions& options,
-                         Progress& progress) {
+                         int examples, Progress& progress) {
   reflections.check();
   options.check();
   DenseMap result;
@@ -128,7 +144,13 @@ DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
   const WideFrames wide(frames, reflections, options.width_px);
   std::vector<DepthMap> maps = depth_maps(wide, structure, sets, options, progress);
   progress.begin("consistency");
+  const std::vector<int> shown = spread(static_cast<int>(maps.size()), examples);
+  result.examples = examples_of(wide, structure, sets, maps, shown);
   keep_consistent(maps, options);
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    result.examples[i].agreed = maps[shown[i]].depth;
+    result.examples[i].sigma = maps[shown[i]].sigma;
+  }
 
   std::vector<float> widths, sigmas;  // of a pixel on the wall; over the depth
   std::size_t pixels = 0;

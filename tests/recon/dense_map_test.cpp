@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <opencv2/core.hpp>
 
 #include "synthetic.h"
 
@@ -71,7 +72,7 @@ class DenseMapOfFrames : public ::testing::Test {
     options.max_depth_maps = 6;
     options.depth_maps_a_point = 4;
     Progress progress(Progress::Output::silent);
-    return build_dense_map(frames, structure, preprocess.reflections, options, progress);
+    return build_dense_map(frames, structure, preprocess.reflections, options, 2, progress);
   }
 
   static inline std::filesystem::path folder_;
@@ -81,6 +82,11 @@ class DenseMapOfFrames : public ::testing::Test {
 TEST_F(DenseMapOfFrames, IsTheWallAndTheSameForAnyNumberOfThreads) {
   const DenseMap map = build(1);
   EXPECT_EQ(map.depth_maps, 6);
+  ASSERT_EQ(map.examples.size(), 2u);
+  EXPECT_LT(map.examples[0].frame, map.examples[1].frame);
+  EXPECT_EQ(map.examples[0].picture.size(), map.examples[0].agreed.size());
+  EXPECT_GT(cv::countNonZero(map.examples[0].found > 0.0f),
+            cv::countNonZero(map.examples[0].agreed > 0.0f));
   ASSERT_GE(map.mesh.vertices.size(), 1000u);
   ASSERT_EQ(map.mesh.colors.size(), map.mesh.vertices.size());
   ASSERT_EQ(map.mesh.normals.size(), map.mesh.vertices.size());
@@ -116,7 +122,7 @@ TEST_F(DenseMapOfFrames, WrongPosesLeaveNextToNothing) {
 TEST_F(DenseMapOfFrames, NothingPlacedIsAnEmptyMap) {
   const FrameSource frames(Observations::open(recording_.images, recording_.calibration), {});
   Progress progress(Progress::Output::silent);
-  const DenseMap map = build_dense_map(frames, Structure{}, {}, DenseOptions{}, progress);
+  const DenseMap map = build_dense_map(frames, Structure{}, {}, DenseOptions{}, 2, progress);
   EXPECT_TRUE(map.mesh.empty());
   EXPECT_EQ(map.depth_maps, 0);
 }
