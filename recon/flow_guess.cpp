@@ -31,4 +31,17 @@ cv::Mat guess_flow(const std::vector<Vec2>& from, const std::vector<Vec2>& to, d
   return flow;
 }
 
+cv::Mat continued(const PairAlignment& pair, int next, cv::Size size) {
+  const double scale = static_cast<double>(next - pair.moving) / (pair.moving - pair.reference);
+  std::vector<Vec2> to(pair.moving_px.size());
+  for (std::size_t i = 0; i < to.size(); ++i)
+    to[i] = pair.moving_px[i] + (pair.moving_px[i] - pair.reference_px[i]);
+  return guess_flow(pair.moving_px, to, scale, size);
+}
+
+cv::Mat continued_from(const PairAlignment& pair, int next, cv::Size size) {
+  const double scale = static_cast<double>(next - pair.reference) / (pair.moving - pair.reference);
+  return guess_flow(pair.reference_px, pair.moving_px, scale, size);
+}
+
 }  // namespace rugae

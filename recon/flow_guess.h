@@ -4,7 +4,7 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "core/types.h"
+#include "recon/align.h"
 
 namespace rugae {
 
@@ -15,5 +15,10 @@ cv::Mat guess_flow(const std::vector<Vec2>& from, const std::vector<Vec2>& to, d
                    cv::Size size);
 
 inline constexpr int kMinGuessPoints = 8;
+
+/// The flow from pair.moving to the frame `next` when the motion of the pair goes on at its speed.
+cv::Mat continued(const PairAlignment& pair, int next, cv::Size size);
+/// The flow from pair.reference likewise.
+cv::Mat continued_from(const PairAlignment& pair, int next, cv::Size size);
 
 }  // namespace rugae

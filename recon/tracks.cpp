@@ -11,6 +11,7 @@
 
 #include "core/random.h"
 #include "recon/flow_guess.h"
+#include "recon/look_back.h"
 
 namespace rugae {
 namespace {
@@ -21,7 +22,8 @@ constexpr int kCornerBlock = 7;           // px
 // Of the points of a key frame, those found in the next: three quarters as a rule, less than this
 // where the next comes too late.
 constexpr double kMinFollowedShare = 0.5;
-constexpr int kBorder = 8;  // px: no corner nearer to where the image ends
+constexpr int kBorder = 8;                // px: no corner nearer to where the image ends
+constexpr std::size_t kLookedBackAt = 3;  // earlier key frames, where the chain broke
 
 // Occupied cells of side `spacing`: a point is taken when another lies within `spacing` of it.
 class Occupied {
@@ -74,27 +76,12 @@ std::vector<Vec2> corners(const Frame& frame, double spacing_px) {
   return points;
 }
 
-// The flow from pair.moving to `next` when the motion of the pair goes on at its speed.
-cv::Mat continued(const PairAlignment& pair, int next, cv::Size size) {
-  const double scale = static_cast<double>(next - pair.moving) / (pair.moving - pair.reference);
-  std::vector<Vec2> to(pair.moving_px.size());
-  for (std::size_t i = 0; i < to.size(); ++i)
-    to[i] = pair.moving_px[i] + (pair.moving_px[i] - pair.reference_px[i]);
-  return guess_flow(pair.moving_px, to, scale, size);
-}
-
 // Observations by frame index become observations by position among the key frames.
 void number_keyframes(std::vector<Track>& tracks, const std::vector<int>& keyframes) {
   for (Track& track : tracks)
     for (Track::Observation& o : track.observations)
       o.keyframe =
           static_cast<int>(std::ranges::lower_bound(keyframes, o.keyframe) - keyframes.begin());
-}
-
-// The flow from pair.reference to `next` likewise.
-cv::Mat continued_from(const PairAlignment& pair, int next, cv::Size size) {
-  const double scale = static_cast<double>(next - pair.reference) / (pair.moving - pair.reference);
-  return guess_flow(pair.reference_px, pair.moving_px, scale, size);
 }
 
 }  // namespace
@@ -192,6 +179,22 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
     return place->second;
   };
   TrackChain chain;
+  LookBack memory(frames.valid());
+  // Where the chain broke before this key frame: the points of an earlier one go on.
+  int bridges = 0;
+  const auto look_back = [&](const AlignImage& image) {
+    memory.add(image.index, image.gray);
+    for (const LookBack::Candidate& earlier : memory.candidates(image.index, kLookedBackAt)) {
+      const AlignGuess known{chain.starts(earlier.frame, {}, spacing_px), earlier.flow, false, {}};
+      const auto pair = align(prepare_alignment(frames.pose_frame(earlier.frame), field), image,
+                              align_options, pair_seed(seed, earlier.frame, image.index), known);
+      if (!pair) continue;
+      chain.add(image.index, pair->point_index, pair->moving_px, spacing_px);
+      memory.link(earlier.frame, image.index);
+      ++bridges;
+      return;
+    }
+  };
   std::optional<PairAlignment> previous;  // k - 1 to k
   // The flow between the next two key frames, measured while this one's neighbours are aligned.
   struct {
@@ -201,6 +204,7 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
   int failed = 0;
   for (std::size_t k = 0; k < at.size(); ++k) {
     const AlignImage& reference = load(at[k]).image;
+    look_back(reference);
     const cv::Size size = reference.gray.size();
     const std::vector<Vec2> points = chain.starts(at[k], load(at[k]).corners, spacing_px);
     const auto follow = [&](const AlignImage& moving, const cv::Mat& guess, bool affine) {
@@ -263,6 +267,7 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
     tasks.wait();
     if (arrives) prepared[at[newcomer]] = std::move(arriving);
     if (k + 2 < at.size() && count > 1) ahead = {at[k + 1], at[k + 2], std::move(next_flow)};
+    if (previous && !found.empty() && !found[0]) memory.end(*previous);
     previous.reset();
     for (std::size_t i = 0; i < count; ++i) {
       if (!found[i]) {
@@ -270,6 +275,7 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
         continue;
       }
       chain.add(found[i]->moving, found[i]->point_index, found[i]->moving_px, spacing_px);
+      memory.link(found[i]->reference, found[i]->moving);
       if (i == 0) previous = found[0];
       followed.pairs.push_back(std::move(*found[i]));
     }
@@ -279,9 +285,10 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
   followed.tracks = chain.finish();
   number_keyframes(followed.tracks, at);
   set_rays(followed.tracks, frames.lens());
-  progress.end(fmt::format("{} pairs, {} failed, {} tracks, {} key frames more",
+  progress.end(fmt::format("{} pairs, {} failed, {} tracks, {} key frames more{}",
                            followed.pairs.size(), failed, followed.tracks.size(),
-                           at.size() - keyframes.frames.size()));
+                           at.size() - keyframes.frames.size(),
+                           bridges > 0 ? fmt::format(", {} gaps bridged", bridges) : ""));
   return followed;
 }
 

@@ -50,7 +50,8 @@ struct Followed {
 /// Aligns each key frame to the `neighbours` after it and chains the inliers into tracks. Where the
 /// next one cannot be aligned, or fewer than half of the points are found in it, a frame between
 /// them becomes a key frame: half way, a quarter, ... as near as it needs to be; where even the
-/// very next frame cannot be aligned, the chain breaks. Fresh tracks start at corners (Shi and
+/// very next frame cannot be aligned, the chain breaks; key frames after that look back at the
+/// earlier ones most like them, to go on with their points. Fresh tracks start at corners (Shi and
 /// Tomasi, CVPR 1994, doi:10.1109/CVPR.1994.323794) off the reflections, where the flow is best
 /// determined.
 Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
