@@ -23,6 +23,7 @@ constexpr int kCornerBlock = 7;           // px
 // where the next comes too late.
 constexpr double kMinFollowedShare = 0.5;
 constexpr int kBorder = 8;                // px: no corner nearer to where the image ends
+constexpr int kMoreRounds = 2;            // of following again, where few points were found
 constexpr std::size_t kLookedBackAt = 3;  // earlier key frames, where the chain broke
 
 // Occupied cells of side `spacing`: a point is taken when another lies within `spacing` of it.
@@ -237,6 +238,17 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
         if (kept(nearer) <= kept(found[0])) continue;
         found[0] = std::move(nearer);
         at.insert(at.begin() + static_cast<std::ptrdiff_t>(k) + 1, next);
+      }
+      // Few even so: what was found shows the way to the rest, or the motion before does.
+      const AlignImage& next = load(at[k + 1]).image;
+      for (int round = 0; round < kMoreRounds && static_cast<double>(kept(found[0])) < enough;
+           ++round) {
+        std::vector<cv::Mat> guesses;
+        if (found[0]) guesses.push_back(continued_from(*found[0], next.index, size));
+        if (previous) guesses.push_back(continued(*previous, next.index, size));
+        for (const cv::Mat& guess : guesses)
+          if (auto more = follow(next, guess, true); kept(more) > kept(found[0]))
+            found[0] = std::move(more);
       }
     }
     // To those after it: the motion to the next goes on.
