@@ -91,8 +91,8 @@ struct DenseOptions {
   int window_radius_px = 4;        // of the correlation, in the depth map's pixels
   double min_score = 0.45;         // correlation of a depth that is believed
   double max_sigma_share = 0.05;   // standard deviation of a depth that is believed, over the depth
-  int consistent_maps = 2;         // other depth maps that must agree
-  double consistent_sigmas = 3.0;  // within so many joint standard deviations
+  int consistent_maps = 1;         // other depth maps that must agree
+  double consistent_sigmas = 2.0;  // within so many joint standard deviations
   double voxel_px = 4.0;           // side of a voxel, in the wall's width of a depth map's pixel
   void check() const;
 };
