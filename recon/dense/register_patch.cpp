@@ -12,8 +12,10 @@ namespace rugae {
 namespace {
 
 constexpr double kReferenceWidthPx = 640.0;
-constexpr double kRadiusPx = 12.0;       // of the registration, at 640 px width
-constexpr double kMaxMotionPx = 4.0;     // from its start, likewise
+constexpr double kRadiusPx = 12.0;      // of the registration, at 640 px width
+constexpr double kMaxMotionPx = 4.0;    // from its start, likewise
+constexpr double kLeastRadiusPx = 7.0;  // of any picture: fewer pixels fix no place, as for tracks
+constexpr double kLeastMotionPx = 2.5;
 constexpr double kMinCorrelation = 0.7;  // of what is then judged by consensus
 constexpr int kTemplateHalfPx = 4;       // of the search, coarse
 constexpr int kTemplateSide = 2 * kTemplateHalfPx + 1;
@@ -23,8 +25,8 @@ constexpr double kMinSearchScore =
 PointRefinementOptions refinement_of(const Lens& lens) {
   const double scale = std::min(lens.width, kFineWidthPx) / kReferenceWidthPx;
   PointRefinementOptions options;
-  options.radius_px = kRadiusPx * scale;
-  options.max_motion_px = kMaxMotionPx * scale;
+  options.radius_px = std::max(kLeastRadiusPx, kRadiusPx * scale);
+  options.max_motion_px = std::max(kLeastMotionPx, kMaxMotionPx * scale);
   options.min_correlation = kMinCorrelation;
   return options;
 }

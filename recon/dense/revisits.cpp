@@ -109,7 +109,7 @@ FrameResult look_in(int keyframe, const PatchImage& image, const std::vector<Wal
                              .observations[static_cast<std::size_t>(observation_of[p])]
                              .pixel;
       const auto pixel = registrar.settle(patch, *sight, image, start);
-      if (pixel && (*pixel - start).norm() <= kMaxShiftPx * scale)
+      if (pixel && (*pixel - start).norm() <= kMaxShiftPx * std::max(1.0, scale))
         result.registered.push_back({p, *pixel, observation_of[p]});
       continue;
     }

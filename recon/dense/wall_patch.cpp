@@ -23,6 +23,10 @@ constexpr double kBorderPx = 2.0;
 constexpr int kFineHalfPx = 17;      // of the squares that are kept: a patch, its gradient
 constexpr int kCoarseHalfPx = 10;    // half a search template seen at half its size
 constexpr std::size_t kAtOnce = 16;  // key frames held at a time
+/// In a picture narrower than this noise hides the texture of a patch; smoothed, three times as
+/// many are registered.
+constexpr int kNarrowPx = 320;
+constexpr double kSmoothingPx = 0.8;
 
 struct Point {
   int track;
@@ -132,6 +136,7 @@ PatchImage prepare_patch_image(const Frame& frame) {
   };
   image.fine_shrink = shrink_to(kFineWidthPx);
   shrunk(frame.gray, image.fine_shrink).convertTo(image.fine, CV_32F, 1.0 / 255.0);
+  if (frame.gray.cols < kNarrowPx) cv::GaussianBlur(image.fine, image.fine, {}, kSmoothingPx);
   image.coarse_shrink = shrink_to(kCoarseWidthPx);
   const cv::Mat small = shrunk(frame.gray, image.coarse_shrink),
                 valid = shrunk(frame.valid, image.coarse_shrink);
