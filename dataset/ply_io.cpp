@@ -1,5 +1,6 @@
 #include "dataset/ply_io.h"
 
+#include <cmath>
 #include <cstring>
 #include <optional>
 #include <sstream>
@@ -95,7 +96,11 @@ TriangleMesh read_ply(const std::filesystem::path& file) {
     check(mesh.vertices.back().allFinite(), "{}: vertex {} is not finite", file.string(), v);
     if (header->normals) mesh.normals.push_back(take3<float, Vec3f>(at));
     if (header->colors) mesh.colors.push_back(take3<unsigned char, Vec3f>(at) / 255.0f);
-    if (header->sigma) mesh.sigma.push_back(take<float>(at));
+    if (header->sigma) {
+      mesh.sigma.push_back(take<float>(at));
+      check(std::isfinite(mesh.sigma.back()) && mesh.sigma.back() > 0.0f,
+            "{}: vertex {} has sigma {}, expected above 0", file.string(), v, mesh.sigma.back());
+    }
   }
   const auto last = static_cast<std::int64_t>(header->vertices) - 1;
   for (std::size_t t = 0; t < header->triangles; ++t) {

@@ -29,6 +29,7 @@ void LookBack::add(int frame, const cv::Mat& gray) {
   cv::resize(gray, small, valid_.size(), 0.0, 0.0, cv::INTER_AREA);
   seen_[frame] = even_light(small, valid_ == 255);
   parent_.try_emplace(frame, frame);
+  ++sizes_[root_of(frame)];
 }
 
 int LookBack::root_of(int frame) const {
@@ -39,26 +40,28 @@ int LookBack::root_of(int frame) const {
 void LookBack::link(int frame, int other) {
   parent_.try_emplace(frame, frame);
   parent_.try_emplace(other, other);
-  const int a = root_of(frame), b = root_of(other);
-  parent_[std::max(a, b)] = std::min(a, b);
+  const auto [first, second] = std::minmax({root_of(frame), root_of(other)});
+  if (first == second) return;
+  parent_[second] = first;
+  sizes_[first] += sizes_[second];
+  sizes_.erase(second);
 }
 
 void LookBack::end(const PairAlignment& last) { ends_.push_back(last); }
 
 // Of as many, those that began first.
 bool LookBack::with_most(int frame) const {
-  std::map<int, int> sizes;
-  for (const auto& [key, picture] : seen_) ++sizes[root_of(key)];
-  const int own = root_of(frame);
-  return std::ranges::all_of(sizes, [&](const auto& of_root) {
-    return of_root.second < sizes[own] || of_root.first >= own;
+  const int own = root_of(frame), size = sizes_.at(own);
+  return std::ranges::all_of(sizes_, [&](const auto& of_root) {
+    return of_root.second < size || (of_root.second == size && of_root.first >= own);
   });
 }
 
-std::vector<LookBack::Candidate> LookBack::alike(int frame) const {
+std::vector<LookBack::Candidate> LookBack::alike(int frame, std::size_t count) const {
   struct Alike {
     double likeness = 0.0;  // normalised correlation
-    Candidate candidate;
+    int frame = -1;
+    cv::Scalar shift_px;
   };
   const int own = root_of(frame);
   const cv::Mat& picture = seen_.at(frame);
@@ -75,12 +78,14 @@ std::vector<LookBack::Candidate> LookBack::alike(int frame) const {
     cv::Point best;
     cv::minMaxLoc(scores, nullptr, &likeness, nullptr, &best);
     if (!(likeness >= kMinLikeness)) continue;
-    const cv::Scalar shift_px(shrink_ * (corner.x - best.x), shrink_ * (corner.y - best.y));
-    found.push_back({likeness, {key, cv::Mat(size_, CV_32FC2, shift_px)}});
+    found.push_back(
+        {likeness, key, {shrink_ * (corner.x - best.x), shrink_ * (corner.y - best.y)}});
   }
   std::ranges::stable_sort(found, std::greater{}, &Alike::likeness);
+  if (found.size() > count) found.resize(count);
   std::vector<Candidate> candidates;
-  for (Alike& one : found) candidates.push_back(std::move(one.candidate));
+  for (const Alike& one : found)
+    candidates.push_back({one.frame, cv::Mat(size_, CV_32FC2, one.shift_px)});
   return candidates;
 }
 
@@ -94,8 +99,8 @@ std::vector<LookBack::Candidate> LookBack::candidates(int frame, std::size_t cou
   if (last != ends_.rend() &&
       frame - last->moving <= kMaxContinued * (last->moving - last->reference))
     found.push_back({last->moving, continued(*last, frame, size_)});
-  for (Candidate& candidate : alike(frame)) found.push_back(std::move(candidate));
-  if (found.size() > count) found.resize(count);
+  for (Candidate& candidate : alike(frame, count - std::min(count, found.size())))
+    found.push_back(std::move(candidate));
   return found;
 }
 

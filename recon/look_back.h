@@ -37,13 +37,14 @@ class LookBack {
  private:
   int root_of(int frame) const;
   bool with_most(int frame) const;
-  std::vector<Candidate> alike(int frame) const;
+  std::vector<Candidate> alike(int frame, std::size_t count) const;
 
   double shrink_;                    // of the pictures
   cv::Mat valid_;                    // small, CV_8U
   cv::Size size_;                    // of the frames
   std::map<int, cv::Mat> seen_;      // CV_8U, light evened
   std::map<int, int> parent_;        // of frames that hang together, a tree
+  std::map<int, int> sizes_;         // of each root: how many of them were added
   std::vector<PairAlignment> ends_;  // the last pairs of chains
 };
 

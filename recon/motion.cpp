@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/check.h"
-#include "recon/pictures.h"
+#include "recon/spread.h"
 
 namespace rugae {
 namespace {

@@ -13,6 +13,7 @@
 #include "recon/flow.h"
 #include "recon/keyframes.h"
 #include "recon/preprocess/reflections.h"
+#include "recon/spread.h"
 
 namespace rugae {
 namespace fs = std::filesystem;
@@ -61,15 +62,6 @@ cv::Mat gray_as_bgr(const cv::Mat& gray) {
 }
 
 }  // namespace
-
-std::vector<int> spread(int n, int count) {
-  std::vector<int> which;
-  for (int i = 0; i < count; ++i) {
-    const int at = static_cast<int>((i + 0.5) * n / count);
-    if (at < n && (which.empty() || which.back() != at)) which.push_back(at);
-  }
-  return which;
-}
 
 void draw_preprocess(const fs::path& folder, const FrameSource& frames,
                      const std::vector<int>& indices, const PreprocessOptions& options) {
@@ -136,7 +128,7 @@ void draw_tracks(const fs::path& folder, const FrameSource& frames, const Struct
 
 void draw_links(const fs::path& folder, const Structure& structure) {
   constexpr int kMostPx = 1000;  // of the picture: of more key frames each pixel is several
-  constexpr double kMany = 500;  // shared points: white
+  constexpr double kMany = 500;  // shared points: the brightest
   const auto n = static_cast<int>(structure.frames.size());
   if (n == 0) return;
   const int each = (n + kMostPx - 1) / kMostPx, side = (n + each - 1) / each;

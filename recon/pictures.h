@@ -37,7 +37,4 @@ void draw_links(const std::filesystem::path& folder, const Structure& structure)
 void draw_depth_maps(const std::filesystem::path& folder, const std::vector<DepthExample>& examples,
                      double max_sigma_share);
 
-/// `count` of 0 ... n-1, evenly spread, ascending, without repetition.
-std::vector<int> spread(int n, int count);
-
 }  // namespace rugae

@@ -13,6 +13,7 @@
 #include "recon/map.h"
 #include "recon/mosaic.h"
 #include "recon/pictures.h"
+#include "recon/spread.h"
 
 namespace rugae {
 namespace {

@@ -14,7 +14,7 @@
 #include "recon/dense/view_choice.h"
 #include "recon/dense/volume.h"
 #include "recon/mesh_pieces.h"
-#include "recon/pictures.h"
+#include "recon/spread.h"
 
 namespace rugae {
 namespace {

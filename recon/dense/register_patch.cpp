@@ -12,15 +12,15 @@ namespace rugae {
 namespace {
 
 constexpr double kReferenceWidthPx = 640.0;
-constexpr double kRadiusPx = 12.0;      // of the registration, at 640 px width
-constexpr double kMaxMotionPx = 4.0;    // from its start, likewise
-constexpr double kLeastRadiusPx = 7.0;  // of any picture: fewer pixels fix no place, as for tracks
-constexpr double kLeastMotionPx = 2.5;
+constexpr double kRadiusPx = 12.0;       // of the registration, at 640 px width
+constexpr double kMaxMotionPx = 4.0;     // from its start, likewise
+constexpr double kLeastRadiusPx = 7.0;   // of any picture: fewer pixels fix no place, as for tracks
+constexpr double kLeastMotionPx = 2.5;   // likewise: their places are no nearer in pixels
 constexpr double kMinCorrelation = 0.7;  // of what is then judged by consensus
 constexpr int kTemplateHalfPx = 4;       // of the search, coarse
 constexpr int kTemplateSide = 2 * kTemplateHalfPx + 1;
-constexpr double kMinSearchScore =
-    0.6;  // a coarse sieve: what passes must settle, and agree with the others
+/// A coarse sieve: what passes must settle, and agree with the others.
+constexpr double kMinSearchScore = 0.6;
 
 PointRefinementOptions refinement_of(const Lens& lens) {
   const double scale = std::min(lens.width, kFineWidthPx) / kReferenceWidthPx;

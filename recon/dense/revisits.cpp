@@ -15,7 +15,9 @@ namespace rugae {
 namespace {
 
 constexpr double kReferenceWidthPx = 640.0;
-constexpr double kMaxShiftPx = 1.5;  // by which registration may move a track's observation
+// By which registration may move a track's observation, at 640 px width; a narrower picture's
+// tracks are no more precise in pixels, so there as many.
+constexpr double kMaxShiftPx = 1.5;
 constexpr std::size_t kAtOnce = 16;  // key frames between two steps of the progress line
 constexpr int kGroupGap = 8;         // key frames between the anchors of one group
 

@@ -65,6 +65,7 @@ TEST(SurfaceError, SigmaIsHeldAgainstTheError) {
   const auto there = surface_error(transformed(transformed(map, metres), metres.inverse()),
                                    shapes::plane(40, 40, 4, 0.0), kFew);
   EXPECT_NEAR(there->sigma->median_ratio, 1.25, 1e-5);
+  EXPECT_NEAR(transformed(map, metres).sigma[0], 0.8e-3, 1e-9);
 }
 
 TEST(SurfaceError, NoSurfaceIsEmpty) {
