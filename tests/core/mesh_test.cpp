@@ -159,6 +159,11 @@ TEST_F(MeshFiles, GlbIsInMetresAndReadsBack) {
   TriangleMesh m = sphere(100.0, 2);
   m.sigma.assign(m.vertices.size(), 0.25f);
   write_glb(folder_ / "a.glb", m);
+  const std::string bytes = read_text(folder_ / "a.glb");
+  EXPECT_NE(bytes.find("\"_SIGMA\""), std::string::npos);
+  const std::vector<float> metres(m.vertices.size(), 0.25e-3f);
+  EXPECT_NE(bytes.find({reinterpret_cast<const char*>(metres.data()), 4 * metres.size()}),
+            std::string::npos);
   const TriangleMesh back = read_mesh(folder_ / "a.glb", 1000.0);
   ASSERT_EQ(back.triangles.size(), m.triangles.size());
   EXPECT_NEAR(signed_volume_mm3(back) / signed_volume_mm3(m), 1.0, 1e-5);  // float positions

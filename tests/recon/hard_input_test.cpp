@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr int kFrames = 24;
 constexpr double kStepRad = 0.035;  // about 0.8 mm and 2 degrees between frames
+constexpr double kWhipRad = 0.32;   // 18 degrees
 /// Of the path's extent: three times what clean pictures of this size give.
 constexpr double kPathShare = 0.03;
 
@@ -123,6 +124,20 @@ TEST_P(HardInput, BlackFramesInTheMiddle) {
   const Outcome outcome = run(pictures, recording_.world_from_camera);
   expect_right(outcome, kFrames - kBlack);
   EXPECT_LE(outcome.placed, kFrames - kBlack);
+}
+
+// Four frames in which the camera turns by a fifth of the picture each: of the flow a part
+// alone is right at first.
+TEST_P(HardInput, AWhipInTheMiddle) {
+  std::vector<cv::Mat> pictures;
+  std::vector<Rigid3> truth;
+  double turned_rad = 0.0;
+  for (int i = 0; i < kFrames; ++i) {
+    truth.push_back(synthetic::world_from_camera(turned_rad));
+    pictures.push_back(synthetic::picture(lens(), truth.back(), 1.0, 6, i));
+    turned_rad += i >= 10 && i < 14 ? kWhipRad : kStepRad;
+  }
+  expect_right(run(pictures, truth), kFrames);
 }
 
 // White blots over half of every picture, standing still as the lamps do.

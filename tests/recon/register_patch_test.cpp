@@ -5,11 +5,13 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/files.h"
+#include "core/random.h"
 #include "dataset/image_io.h"
 #include "synthetic_texture.h"
 
@@ -24,6 +26,8 @@ class RegisterPatch : public ::testing::TestWithParam<int> {
   int width() const { return GetParam(); }
   int height() const { return width() * 3 / 4; }
   int shift_px() const { return width() / 32; }
+  virtual double contrast() const { return 1.0; }      // of the texture, 38 levels
+  virtual double noise_levels() const { return 0.0; }  // standard deviation, of 255
   Lens lens() const {
     Lens lens;
     lens.width = width();
@@ -42,9 +46,13 @@ class RegisterPatch : public ::testing::TestWithParam<int> {
     const cv::Mat wall =
         testing::draw(width() + shift_px(), height(), testing::Texture(4, width() / 60.0, 60.0));
     for (int i = 0; i < 2; ++i) {
-      cv::Mat bgr;
-      cv::cvtColor(testing::to_8bit(wall(cv::Rect(i * shift_px(), 0, width(), height()))), bgr,
-                   cv::COLOR_GRAY2BGR);
+      cv::Mat bgr, seen = wall(cv::Rect(i * shift_px(), 0, width(), height())).clone();
+      for (int y = 0; y < seen.rows; ++y)
+        for (int x = 0; x < seen.cols; ++x)
+          seen.at<float>(y, x) = static_cast<float>(
+              0.5 + contrast() * (seen.at<float>(y, x) - 0.5) +
+              noise_levels() / 255.0 * random_normal(1, Purpose::test, i, y * seen.cols + x)[0]);
+      cv::cvtColor(testing::to_8bit(seen), bgr, cv::COLOR_GRAY2BGR);
       write_image(folder_ / (std::to_string(i) + ".png"), bgr);
     }
     write_atomic(folder_ / "lens.yaml", lens_yaml(lens(), "test"));
@@ -101,6 +109,37 @@ TEST_P(RegisterPatch, FindsThePlaceFromAWrongGuess) {
     ++found;
   }
   EXPECT_GE(found, static_cast<int>(patches.size()) * 3 / 4) << patches.size();
+}
+
+// As the smallest of the cameras sees a far wall: 250 px wide, texture of 8 levels, noise of 4.
+class RegisterNoisyPatch : public RegisterPatch {
+ protected:
+  double contrast() const override { return 0.2; }
+  double noise_levels() const override { return 4.0; }
+};
+INSTANTIATE_TEST_SUITE_P(Narrow, RegisterNoisyPatch, ::testing::Values(250));
+
+TEST_P(RegisterNoisyPatch, SettlesThreeInFour) {
+  PreprocessOptions options;
+  options.devignette = false;
+  const FrameSource frames(Observations::open(folder_, folder_ / "lens.yaml"), options);
+  const auto patches = make_patches(frames, structure_);
+  ASSERT_GE(patches.size(), structure_.tracks.size() * 3 / 4);
+  const PatchImage image = prepare_patch_image(frames.pose_frame(1));
+  const PatchRegistrar registrar(lens());
+  const LensProjector projector(lens());
+  int settled = 0;
+  double square = 0.0;
+  for (const WallPatch& patch : patches) {
+    const auto sight = foretell(patch, structure_.cam_from_world[1], projector);
+    if (!sight) continue;
+    const auto pixel = registrar.settle(patch, *sight, image, sight->pixel + Vec2(0.4, -0.3));
+    if (!pixel) continue;
+    square += (*pixel - (patch.anchor_px - Vec2(shift_px(), 0.0))).squaredNorm();
+    ++settled;
+  }
+  EXPECT_GE(settled, static_cast<int>(patches.size()) * 3 / 4) << patches.size();
+  EXPECT_LE(std::sqrt(square / settled), 0.5);  // px: the guess is that far off
 }
 
 }  // namespace

@@ -20,6 +20,10 @@ namespace {
 namespace fs = std::filesystem;
 
 // A camera that goes there and comes back: no track lives to see the same wall twice.
+// Of the path's size, what one more adjustment may move a camera: a drafted one leaves three times
+// as much.
+constexpr double kEndShare = 2e-6;
+
 class Revisits : public testing::Test {
  protected:
   static constexpr int kThere = 9, kCameras = 18;
@@ -115,6 +119,21 @@ TEST_F(Revisits, TakeOutTheDrift) {
     both += track.observations.front().keyframe < kThere - 4 &&
             track.observations.back().keyframe > kThere + 4;
   EXPECT_GT(both, 50);
+}
+
+// The last round is adjusted to its end: what follows moves nothing.
+TEST_F(Revisits, EndWhereAdjustingEnds) {
+  const Structure s = linked();
+  Structure again = s;
+  Progress progress(Progress::Output::silent);
+  finish_structure(again, world_.lens, BundleOptions{}, kFinalAdjustment, progress);
+  double moved = 0.0, size = 0.0;
+  for (int k = 0; k < kCameras; ++k) {
+    const Vec3 centre = s.cam_from_world[k].inverse().translation;
+    moved = std::max(moved, (again.cam_from_world[k].inverse().translation - centre).norm());
+    size = std::max(size, centre.norm());
+  }
+  EXPECT_LE(moved, kEndShare * size) << moved / size;
 }
 
 // A camera that is thought to look elsewhere, by 70 degrees, finds nothing of what it should see.
