@@ -193,9 +193,20 @@ int frames_of_trajectory(const Camera& camera, int trajectory) {
   return camera.frames_in_paper / 6 + (trajectory <= camera.frames_in_paper % 6 ? 1 : 0);
 }
 
-Lens load_lens(const std::filesystem::path& file) {
-  return read_lens(YamlReader::from_file(file), file.string());
+Calibration load_calibration(const std::filesystem::path& file) {
+  YamlReader yaml = YamlReader::from_file(file);
+  Calibration calibration;
+  if (yaml.has("row_time_us")) {
+    double& row_time_us = calibration.row_time_us.emplace(0.0);
+    yaml.get("row_time_us", row_time_us);
+    check(row_time_us >= 0.0, "{}: row_time_us is {}, expected 0 (a global shutter) or above",
+          yaml.where("row_time_us"), row_time_us);
+  }
+  calibration.lens = read_lens(std::move(yaml), file.string());
+  return calibration;
 }
+
+Lens load_lens(const std::filesystem::path& file) { return load_calibration(file).lens; }
 
 namespace {
 
@@ -230,9 +241,11 @@ std::string lens_lines(const Lens& lens, const std::string& indent) {
 
 }  // namespace
 
-std::string lens_yaml(const Lens& lens, const std::string& comment) {
+std::string lens_yaml(const Lens& lens, const std::string& comment, double row_time_us) {
   std::string text = comment.empty() ? "" : "# " + comment + "\n";
-  return text + "# pixels; the centre of the first pixel is (0.5, 0.5)\n" + lens_lines(lens, "");
+  text += "# pixels; the centre of the first pixel is (0.5, 0.5)\n" + lens_lines(lens, "");
+  if (row_time_us > 0.0) text += fmt::format("row_time_us: {:.17g}\n", row_time_us);
+  return text;
 }
 
 std::string camera_yaml(const Camera& camera) {

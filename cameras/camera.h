@@ -128,9 +128,18 @@ std::string camera_yaml(const Camera& camera);
 /// trajectories take the remainder.
 int frames_of_trajectory(const Camera& camera, int trajectory);
 
-/// A calibration file holds the lens alone: what a user gets from `rugae calibrate` and what
-/// reconstruction reads.
+/// What a calibration file holds: what a user gets from `rugae calibrate` and what reconstruction
+/// reads.
+struct Calibration {
+  Lens lens;
+  /// From a row to the next below, key row_time_us, which a sensor's data sheet states; empty where
+  /// the file does not say, 0 for a global shutter.
+  std::optional<double> row_time_us;
+};
+Calibration load_calibration(const std::filesystem::path& file);
+/// Its lens alone.
 Lens load_lens(const std::filesystem::path& file);
-std::string lens_yaml(const Lens& lens, const std::string& comment);
+/// Without the row time where it is 0.
+std::string lens_yaml(const Lens& lens, const std::string& comment, double row_time_us = 0.0);
 
 }  // namespace rugae

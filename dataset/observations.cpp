@@ -80,6 +80,20 @@ Source of_images(const fs::path& folder, double fps) {
   return source;
 }
 
+// All rows are read before those of the next frame.
+double checked_row_time_s(const Calibration& calibration, const fs::path& file,
+                          const std::vector<double>& times_s) {
+  constexpr double kRounding = 1.001;  // of times and row times in files
+  const double row_time_s = 1e-6 * calibration.row_time_us.value_or(0.0);
+  const double frame_s =
+      (times_s.back() - times_s.front()) / (static_cast<double>(times_s.size()) - 1.0);
+  check(row_time_s * calibration.lens.height <= kRounding * frame_s,
+        "{}: row_time_us is {}, {} rows take {:.3g} s, but frames are {:.3g} s apart",
+        file.string(), 1e6 * row_time_s, calibration.lens.height,
+        row_time_s * calibration.lens.height, frame_s);
+  return row_time_s;
+}
+
 }  // namespace
 
 Observations Observations::open(const fs::path& folder, const fs::path& calibration, double fps) {
@@ -94,12 +108,17 @@ Observations Observations::open(const fs::path& folder, const fs::path& calibrat
     source = of_images(folder, fps);
   check(source.files.size() >= 2, "{}: {} usable frame{}, at least two are needed", folder.string(),
         source.files.size(), source.files.size() == 1 ? "" : "s");
+  const fs::path own = source.calibration;
   if (!calibration.empty()) source.calibration = calibration;
   check(!calibration.empty() || fs::exists(source.calibration),
         "{}: no calibration for these images; give one with --calibration", folder.string());
 
   Observations observations;
-  observations.lens_ = load_lens(source.calibration);
+  Calibration chosen = load_calibration(source.calibration);
+  if (!chosen.row_time_us && fs::exists(own))
+    chosen.row_time_us = load_calibration(own).row_time_us;
+  observations.lens_ = chosen.lens;
+  observations.row_time_s_ = checked_row_time_s(chosen, source.calibration, source.times_s);
   observations.files_ = std::move(source.files);
   observations.times_s_ = std::move(source.times_s);
   const fs::path absolute = fs::absolute(folder).lexically_normal();

@@ -18,16 +18,20 @@ class Observations {
  public:
   /// A dataset's folder (its observations/ part is used), an observations folder itself, or a plain
   /// folder of images (PNG, JPEG, BMP; by natural order of names) together with a calibration file.
-  /// `calibration` overrides the dataset's own. Times come from frames.csv; a plain folder gets
-  /// index / `fps`. Throws Error for an empty folder, a missing calibration
-  /// ("... give one with --calibration"), images of another size than the lens, fewer than two
-  /// frames.
+  /// `calibration` overrides the dataset's own; where it does not say how long the rows take, the
+  /// dataset's own does. Times come from frames.csv; a plain folder gets index / `fps`. Throws
+  /// Error for an empty folder, a missing calibration ("... give one with --calibration"), images
+  /// of another size than the lens, rows that take longer than a frame, fewer than two frames.
   static Observations open(const std::filesystem::path& folder,
                            const std::filesystem::path& calibration = {}, double fps = 30.0);
 
   int size() const { return static_cast<int>(files_.size()); }
   const Lens& lens() const { return lens_; }
+  /// Of the middle row.
   double time_s(int index) const { return times_s_[index]; }
+  const std::vector<double>& times_s() const { return times_s_; }
+  /// From a row to the next below; 0 for a global shutter.
+  double row_time_s() const { return row_time_s_; }
   const std::filesystem::path& file(int index) const { return files_[index]; }
   /// CV_8UC3, BGR; read from disk at each call (memory does not grow with the number of frames);
   /// checked against the lens' size.
@@ -37,6 +41,7 @@ class Observations {
  private:
   std::string name_;
   Lens lens_;
+  double row_time_s_ = 0.0;
   std::vector<std::filesystem::path> files_;
   std::vector<double> times_s_;
 };

@@ -45,8 +45,9 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world,
                        const Lens& original_lens);
 
 /// The same with the lens' pixel_rays at hand, for many key frames of one lens.
-cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world, const Lens& lens,
-                       const std::vector<Vec3>& rays);
+/// With a rolling shutter depth is that at the time of the pixel's row.
+cv::Mat keyframe_depth(const TriangleMesh& map, const MovingPose& camera,
+                       const RollingShutter& shutter, const std::vector<Vec3>& rays);
 /// Unit rays through all pixel centres, row by row; zero where the lens has none and outside its
 /// field stop.
 std::vector<Vec3> pixel_rays(const Lens& lens);

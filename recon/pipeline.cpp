@@ -10,6 +10,7 @@
 #include "core/files.h"
 #include "dataset/image_io.h"
 #include "recon/dense/dense_map.h"
+#include "recon/dense/moving_keyframes.h"
 #include "recon/map.h"
 #include "recon/mosaic.h"
 #include "recon/pictures.h"
@@ -39,20 +40,22 @@ std::vector<std::optional<MosaicDepth>> place_all(const std::vector<Mosaic>& mos
   return depths;
 }
 
+// `motions` of the key frames.
 void write_depth(const EstimateLayout& layout, const TriangleMesh& map, const Structure& structure,
-                 const Lens& original_lens, Progress& progress) {
+                 const std::vector<CameraMotion>& motions, const RollingShutter& shutter,
+                 Progress& progress) {
   make_folder(layout.depth_folder());
   std::vector<int> placed;
   for (std::size_t k = 0; k < structure.frames.size(); ++k)
     if (structure.placed[k]) placed.push_back(static_cast<int>(k));
   progress.begin("depth of key frames", placed.size());
-  const std::vector<Vec3> rays = pixel_rays(original_lens);
+  const std::vector<Vec3> rays = pixel_rays(shutter.original());
   for (std::size_t begin = 0; begin < placed.size(); begin += kAtOnce) {
     const std::size_t end = std::min(placed.size(), begin + kAtOnce);
     tbb::parallel_for(begin, end, [&](std::size_t i) {
       const int k = placed[i];
       write_exr(layout.depth(structure.frames[k]),
-                keyframe_depth(map, structure.cam_from_world[k], original_lens, rays));
+                keyframe_depth(map, {structure.cam_from_world[k], motions[k]}, shutter, rays));
     });
     progress.step(end - begin);
   }
@@ -127,7 +130,11 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
     progress.begin("map");
     estimate.map = fuse_map(mosaics, depths, structure, frames.lens(), options.map);
   }
-  write_depth(layout, estimate.map, structure, frames.observations().lens(), progress);
+  // The paper's method takes every shutter for a global one.
+  const std::vector<CameraMotion> motions =
+      options.method == "dense" ? keyframe_motions(frames, structure)
+                                : std::vector<CameraMotion>(structure.frames.size());
+  write_depth(layout, estimate.map, structure, motions, frames.shutter(), progress);
   if (options.pictures) {
     progress.begin("pictures");
     draw_preprocess(layout.pictures(), frames, spread(frames.size(), kPictures),

@@ -95,22 +95,24 @@ std::vector<Vec3> pixel_rays(const Lens& lens) {
 
 cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world,
                        const Lens& original_lens) {
-  return keyframe_depth(map, cam_from_world, original_lens, pixel_rays(original_lens));
+  const RollingShutter global(original_lens, original_lens, 0.0);
+  return keyframe_depth(map, {cam_from_world, {}}, global, pixel_rays(original_lens));
 }
 
-cv::Mat keyframe_depth(const TriangleMesh& map, const Rigid3& cam_from_world, const Lens& lens,
-                       const std::vector<Vec3>& rays) {
+cv::Mat keyframe_depth(const TriangleMesh& map, const MovingPose& camera,
+                       const RollingShutter& shutter, const std::vector<Vec3>& rays) {
+  const Lens& lens = shutter.original();
   check(rays.size() == static_cast<std::size_t>(lens.width) * lens.height,
         "keyframe_depth: {} rays for {} x {} pixels", rays.size(), lens.width, lens.height);
-  const LensProjector projector(lens);
   cv::Mat depth(lens.height, lens.width, CV_32F,
                 cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
   const double picture_angle_rad = widest_angle_rad(rays);
   std::vector<Corner> corners;
   corners.reserve(map.vertices.size());
   for (const Vec3& vertex : map.vertices) {
-    const Vec3 p_cam = cam_from_world * vertex;
-    corners.push_back({p_cam, p_cam.z() > 0.0 ? projector.project(p_cam) : std::nullopt});
+    const Vec3 at_frame_time = camera.cam_from_world * vertex;
+    const Vec3 p_cam = shutter.when_seen(at_frame_time, camera.motion).value_or(at_frame_time);
+    corners.push_back({p_cam, p_cam.z() > 0.0 ? shutter.project_original(p_cam) : std::nullopt});
   }
   for (const Vec3i& triangle : map.triangles) {
     const std::array<const Corner*, 3> c = {&corners[triangle[0]], &corners[triangle[1]],

@@ -11,6 +11,7 @@
 #include "recon/dense/albedo.h"
 #include "recon/dense/consistency.h"
 #include "recon/dense/depth_map.h"
+#include "recon/dense/moving_keyframes.h"
 #include "recon/dense/view_choice.h"
 #include "recon/dense/volume.h"
 #include "recon/mesh_pieces.h"
@@ -27,33 +28,61 @@ constexpr double kSmallestIslandPx = 60.0;
 /// Pieces with less than this share of the triangles of the largest piece are noise.
 constexpr double kSmallestPiece = 0.01;
 
-/// Frames as stereo sees them, the latest kept.
+/// Key frames as the camera would have seen them had it stood still.
+class StillKeyframes {
+ public:
+  StillKeyframes(const FrameSource& frames, const WideFrames& wide, const Structure& structure)
+      : wide_(wide), structure_(structure) {
+    if (frames.shutter().rolling()) motions_ = keyframe_motions(frames, structure);
+    for (int level = 1; level < kStereoLevels; ++level) coarsest_ = halved(coarsest_);
+  }
+
+  const PinholeGrid& grid() const { return wide_.grid(); }
+  const Structure& structure() const { return structure_; }
+  DepthPrior prior(int keyframe) const { return depth_prior(structure_, keyframe, coarsest_); }
+  WideFrame read(int keyframe) const {
+    const int frame = structure_.frames[keyframe];
+    if (motions_.empty()) return wide_.read(frame);
+    const DepthPrior around = prior(keyframe);
+    return around.depth.empty() ? wide_.read(frame)
+                                : wide_.read(frame, motions_[keyframe], around.depth);
+  }
+  cv::Mat albedo(int keyframe, const DepthMap& map) const {
+    return albedo_of(read(keyframe), wide_.vignetting_gain(), map);
+  }
+
+ private:
+  const WideFrames& wide_;
+  const Structure& structure_;
+  PinholeGrid coarsest_ = wide_.grid();
+  std::vector<CameraMotion> motions_;  // empty: all rows were read at once
+};
+
+/// Key frames as stereo sees them, the latest kept.
 class Views {
  public:
-  Views(const WideFrames& frames, const Structure& structure, const DenseOptions& options)
-      : frames_(frames), structure_(structure), options_(options) {}
+  Views(const StillKeyframes& frames, const DenseOptions& options)
+      : frames_(frames), options_(options) {}
 
   std::shared_ptr<const StereoView> view(int keyframe) {
     return cache_.get(keyframe, [&] {
       return std::make_shared<const StereoView>(
-          StereoView{structure_.cam_from_world[keyframe],
-                     stereo_levels(frames_.read(structure_.frames[keyframe]), frames_.grid(),
-                                   kStereoLevels, options_.window_radius_px)});
+          StereoView{frames_.structure().cam_from_world[keyframe],
+                     stereo_levels(frames_.read(keyframe), frames_.grid(), kStereoLevels,
+                                   options_.window_radius_px)});
     });
   }
 
  private:
-  const WideFrames& frames_;
-  const Structure& structure_;
+  const StillKeyframes& frames_;
   const DenseOptions& options_;
   Cache<std::shared_ptr<const StereoView>> cache_{kCachedViews};
 };
 
-std::vector<DepthMap> depth_maps(const WideFrames& frames, const Structure& structure,
-                                 const std::vector<StereoSet>& sets, const DenseOptions& options,
-                                 Progress& progress) {
+std::vector<DepthMap> depth_maps(const StillKeyframes& frames, const std::vector<StereoSet>& sets,
+                                 const DenseOptions& options, Progress& progress) {
   progress.begin("stereo", sets.size());
-  Views views(frames, structure, options);
+  Views views(frames, options);
   std::vector<DepthMap> maps(sets.size());
   for (std::size_t begin = 0; begin < sets.size(); begin += kAtOnce) {
     const std::size_t end = std::min(sets.size(), begin + kAtOnce);
@@ -65,9 +94,7 @@ std::vector<DepthMap> depth_maps(const WideFrames& frames, const Structure& stru
         held.push_back(views.view(source));
         sources.push_back(held.back().get());
       }
-      const DepthPrior prior =
-          depth_prior(structure, sets[i].reference, reference->levels.back().grid);
-      maps[i] = estimate_depth(*reference, sources, prior, options);
+      maps[i] = estimate_depth(*reference, sources, frames.prior(sets[i].reference), options);
     });
     progress.step(end - begin);
   }
@@ -91,15 +118,15 @@ void keep_consistent(std::vector<DepthMap>& maps, const DenseOptions& options) {
 }
 
 // Some of the depth maps, as they were found.
-std::vector<DepthExample> examples_of(const WideFrames& frames, const Structure& structure,
+std::vector<DepthExample> examples_of(const StillKeyframes& frames,
                                       const std::vector<StereoSet>& sets,
                                       const std::vector<DepthMap>& maps,
                                       const std::vector<int>& which) {
   std::vector<DepthExample> examples;
   for (const int i : which) {
     DepthExample& example = examples.emplace_back();
-    example.frame = structure.frames[sets[i].reference];
-    frames.read(example.frame).bgr.convertTo(example.picture, CV_8U);
+    example.frame = frames.structure().frames[sets[i].reference];
+    frames.read(sets[i].reference).bgr.convertTo(example.picture, CV_8U);
     example.found = maps[i].depth.clone();
   }
   return examples;
@@ -112,17 +139,15 @@ double median(std::vector<float>& values) {
   return *middle;
 }
 
-TriangleMesh fuse(const WideFrames& frames, const Structure& structure,
-                  const std::vector<StereoSet>& sets, const std::vector<DepthMap>& maps,
-                  double voxel, Progress& progress) {
+TriangleMesh fuse(const StillKeyframes& frames, const std::vector<StereoSet>& sets,
+                  const std::vector<DepthMap>& maps, double voxel, Progress& progress) {
   progress.begin("fusion", maps.size());
   DistanceVolume volume(voxel);
   for (std::size_t begin = 0; begin < maps.size(); begin += kAtOnce) {
     const std::size_t end = std::min(maps.size(), begin + kAtOnce);
     std::vector<cv::Mat> colours(end - begin);
     tbb::parallel_for(begin, end, [&](std::size_t i) {
-      colours[i - begin] = albedo_of(frames.read(structure.frames[sets[i].reference]),
-                                     frames.vignetting_gain(), maps[i]);
+      colours[i - begin] = frames.albedo(sets[i].reference, maps[i]);
     });
     // One after another: a voxel's mean depends on the order in its last bits.
     for (std::size_t i = begin; i < end; ++i) volume.integrate(maps[i], colours[i - begin]);
@@ -142,10 +167,11 @@ DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
   const std::vector<StereoSet> sets = choose_views(structure, options);
   if (sets.empty()) return result;
   const WideFrames wide(frames, reflections, options.width_px);
-  std::vector<DepthMap> maps = depth_maps(wide, structure, sets, options, progress);
+  const StillKeyframes still(frames, wide, structure);
+  std::vector<DepthMap> maps = depth_maps(still, sets, options, progress);
   progress.begin("consistency");
   const std::vector<int> shown = spread(static_cast<int>(maps.size()), examples);
-  result.examples = examples_of(wide, structure, sets, maps, shown);
+  result.examples = examples_of(still, sets, maps, shown);
   keep_consistent(maps, options);
   for (std::size_t i = 0; i < shown.size(); ++i) {
     result.examples[i].agreed = maps[shown[i]].depth;
@@ -171,8 +197,7 @@ DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
                            100.0 * result.depth_share, maps.size(), result.median_sigma));
   if (widths.empty()) return result;
 
-  const TriangleMesh surface =
-      fuse(wide, structure, sets, maps, options.voxel_px * median(widths), progress);
+  const TriangleMesh surface = fuse(still, sets, maps, options.voxel_px * median(widths), progress);
   result.mesh = part_of(surface, vertices_of_large_pieces(surface, kSmallestPiece));
   to_display(result.mesh.colors);
   result.mesh.normals = angle_weighted_normals(result.mesh);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "recon/dense/moving_keyframes.h"
 #include "recon/dense/register_patch.h"
 #include "recon/frames_between.h"
 #include "recon/resection.h"
@@ -35,20 +36,21 @@ std::vector<const WallPatch*> seen_by(const std::vector<int>& keyframes,
 }
 
 std::optional<Rigid3> place(const std::vector<const WallPatch*>& patches, const PatchImage& image,
-                            const Rigid3& guess, const PatchRegistrar& registrar,
-                            const LensProjector& projector, const Lens& lens,
-                            const BundleOptions& options) {
+                            const MovingPose& guess, const PatchRegistrar& registrar,
+                            const RollingShutter& shutter, const BundleOptions& options) {
+  const Lens& lens = shutter.lens();
   const double reach_px = kSearchPx * lens.width / kReferenceWidthPx;
   std::vector<Vec3> points;
   std::vector<Vec2> rays;
   for (const WallPatch* patch : patches) {
-    const auto sight = foretell(*patch, guess, projector);
+    const auto sight = foretell(*patch, guess, shutter);
     if (!sight) continue;
     const auto pixel = registrar.find(*patch, *sight, image, reach_px);
     const auto ray = pixel ? ray_of(lens, *pixel) : std::nullopt;
     if (!ray) continue;
+    const double depth = (guess.cam_from_world * patch->centre).z();
     points.push_back(patch->centre);
-    rays.push_back(*ray);
+    rays.push_back(shutter.ray_at_frame_time(*ray, depth, guess.motion));
   }
   const auto placed = place_by_points(points, rays, lens.fx, options);
   return placed ? std::optional(placed->cam_from_world) : std::nullopt;
@@ -63,7 +65,7 @@ std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
   const int n = frames.size();
   std::vector<std::optional<Rigid3>> poses = keyframe_poses(structure, n);
   const std::vector<int> rest = without_pose(poses), placed = placed_keyframes(structure);
-  progress.begin("frames between", rest.size());
+  progress.begin("frames between", rest.size() * (frames.shutter().rolling() ? 2 : 1));
   if (placed.empty()) {
     progress.end("nothing to place frames in");
     return poses;
@@ -77,24 +79,40 @@ std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
       if (patch_of[t] >= 0) patches_of[o.keyframe].push_back(patch_of[t]);
 
   const PatchRegistrar registrar(frames.lens());
-  const LensProjector projector(frames.lens());
+  const RollingShutter& shutter = frames.shutter();
   const cv::Mat none = cv::Mat::zeros(frames.valid().size(), CV_8U);
-  for (std::size_t begin = 0; begin < rest.size(); begin += kFramesAtOnce) {
-    const std::size_t end = std::min(rest.size(), begin + kFramesAtOnce);
-    tbb::parallel_for(begin, end, [&](std::size_t i) {
-      const int f = rest[i];
-      const PatchImage image = prepare_patch_image({f, frames.gray(f), {}, none, frames.valid()});
-      const Between around = between(structure, placed, f);
-      std::vector<Rigid3> guesses;
-      if (around.cam_from_world) guesses.push_back(*around.cam_from_world);
-      for (const int k : around.keyframes) guesses.push_back(structure.cam_from_world[k]);
-      const auto seen = seen_by(around.keyframes, patches_of, patches);
-      for (const Rigid3& guess : guesses) {
-        poses[f] = place(seen, image, guess, registrar, projector, frames.lens(), options);
-        if (poses[f]) break;
-      }
+  const auto place_all = [&](const auto& guesses_of) {
+    for (std::size_t begin = 0; begin < rest.size(); begin += kFramesAtOnce) {
+      const std::size_t end = std::min(rest.size(), begin + kFramesAtOnce);
+      tbb::parallel_for(begin, end, [&](std::size_t i) {
+        const int f = rest[i];
+        const PatchImage image = prepare_patch_image({f, frames.gray(f), {}, none, frames.valid()});
+        const Between around = between(structure, placed, f);
+        const auto seen = seen_by(around.keyframes, patches_of, patches);
+        for (const MovingPose& guess : guesses_of(f, around)) {
+          const auto pose = place(seen, image, guess, registrar, shutter, options);
+          if (!pose) continue;
+          poses[f] = pose;
+          break;
+        }
+      });
+      progress.step(end - begin);
+    }
+  };
+  const std::vector<CameraMotion> motions = keyframe_motions(frames, structure);
+  place_all([&](int, const Between& around) {
+    const CameraMotion& motion = motions[around.keyframes.front()];  // of the nearer one
+    std::vector<MovingPose> guesses;
+    if (around.cam_from_world) guesses.push_back({*around.cam_from_world, motion});
+    for (const int k : around.keyframes)
+      guesses.push_back({structure.cam_from_world[k], motions[k]});
+    return guesses;
+  });
+  if (shutter.rolling()) {  // how the camera moves is known from the frames next to each now
+    const std::vector<CameraMotion> known = motions_of(poses, frames.observations().times_s());
+    place_all([&](int f, const Between&) {
+      return poses[f] ? std::vector<MovingPose>{{*poses[f], known[f]}} : std::vector<MovingPose>{};
     });
-    progress.step(end - begin);
   }
   const auto lost = std::ranges::count_if(poses, [](const auto& pose) { return !pose; });
   progress.end(fmt::format("{} of {} frames placed, {} lost", n - lost, n, lost));

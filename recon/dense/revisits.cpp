@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "recon/dense/moving_keyframes.h"
 #include "recon/dense/register_patch.h"
 #include "recon/mask_at.h"
 #include "recon/resection.h"
@@ -50,21 +51,23 @@ std::vector<std::pair<std::size_t, std::size_t>> groups_by_anchor(
 
 // Those of the candidates that agree, group by group, on where the key frame stands.
 std::vector<Seen> agreeing(const std::vector<Seen>& candidates,
-                           const std::vector<WallPatch>& patches, const Lens& lens,
-                           const BundleOptions& bundle) {
+                           const std::vector<WallPatch>& patches, const MovingPose& camera,
+                           const RollingShutter& shutter, const BundleOptions& bundle) {
   std::vector<Seen> kept;
   for (const auto& [begin, end] : groups_by_anchor(candidates, patches)) {
     std::vector<Vec3> points;
     std::vector<Vec2> rays;
     std::vector<std::size_t> which;
     for (std::size_t i = begin; i < end; ++i) {
-      const auto ray = ray_of(lens, candidates[i].pixel);
+      const auto ray = ray_of(shutter.lens(), candidates[i].pixel);
       if (!ray) continue;
-      points.push_back(patches[candidates[i].patch].centre);
-      rays.push_back(*ray);
+      const Vec3& point = patches[candidates[i].patch].centre;
+      const double depth = (camera.cam_from_world * point).z();
+      points.push_back(point);
+      rays.push_back(shutter.ray_at_frame_time(*ray, depth, camera.motion));
       which.push_back(i);
     }
-    const auto placement = place_by_points(points, rays, lens.fx, bundle);
+    const auto placement = place_by_points(points, rays, shutter.lens().fx, bundle);
     if (!placement) continue;
     for (std::size_t i = 0; i < which.size(); ++i)
       if (placement->inlier[i]) kept.push_back(candidates[which[i]]);
@@ -91,12 +94,13 @@ std::vector<std::vector<Known>> known_observations(const Structure& structure,
   return known;
 }
 
-FrameResult look_in(int keyframe, const PatchImage& image, const std::vector<WallPatch>& patches,
-                    const std::vector<Known>& known, const PatchRegistrar& registrar,
-                    const LensProjector& projector, const Structure& structure, const Lens& lens,
-                    const RevisitOptions& options, const BundleOptions& bundle) {
-  const double scale = lens.width / kReferenceWidthPx;
-  const Rigid3& pose = structure.cam_from_world[static_cast<std::size_t>(keyframe)];
+FrameResult look_in(int keyframe, const CameraMotion& motion, const PatchImage& image,
+                    const std::vector<WallPatch>& patches, const std::vector<Known>& known,
+                    const PatchRegistrar& registrar, const RollingShutter& shutter,
+                    const Structure& structure, const RevisitOptions& options,
+                    const BundleOptions& bundle) {
+  const double scale = shutter.lens().width / kReferenceWidthPx;
+  const MovingPose camera{structure.cam_from_world[static_cast<std::size_t>(keyframe)], motion};
   std::vector<int> observation_of(patches.size(), -1);
   for (const Known& k : known) observation_of[k.patch] = k.observation;
   FrameResult result;
@@ -104,7 +108,7 @@ FrameResult look_in(int keyframe, const PatchImage& image, const std::vector<Wal
   for (std::size_t p = 0; p < patches.size(); ++p) {
     const WallPatch& patch = patches[p];
     if (patch.anchor == keyframe) continue;
-    const auto sight = foretell(patch, pose, projector);
+    const auto sight = foretell(patch, camera, shutter);
     if (!sight) continue;
     if (observation_of[p] >= 0) {
       const Vec2 start = structure.tracks[static_cast<std::size_t>(patch.track)]
@@ -121,7 +125,7 @@ FrameResult look_in(int keyframe, const PatchImage& image, const std::vector<Wal
     if (pixel) candidates.push_back({p, *pixel});
   }
   result.found = candidates.size();
-  result.added = agreeing(candidates, patches, lens, bundle);
+  result.added = agreeing(candidates, patches, camera, shutter, bundle);
   return result;
 }
 
@@ -133,15 +137,15 @@ RevisitReport observe_again(const FrameSource& frames, const std::vector<WallPat
   const std::size_t n = structure.frames.size();
   const auto known = known_observations(structure, patches);
   const PatchRegistrar registrar(frames.lens());
-  const LensProjector projector(frames.lens());
+  const std::vector<CameraMotion> motions = keyframe_motions(frames, structure);
   std::vector<FrameResult> results(n);
   for (std::size_t begin = 0; begin < n; begin += kAtOnce) {
     const std::size_t end = std::min(n, begin + kAtOnce);
     tbb::parallel_for(begin, end, [&](std::size_t k) {
       if (!structure.placed[k]) return;
       const PatchImage image = prepare_patch_image(frames.pose_frame(structure.frames[k]));
-      results[k] = look_in(static_cast<int>(k), image, patches, known[k], registrar, projector,
-                           structure, frames.lens(), options, bundle);
+      results[k] = look_in(static_cast<int>(k), motions[k], image, patches, known[k], registrar,
+                           frames.shutter(), structure, options, bundle);
     });
     progress.step(end - begin);
   }
@@ -165,12 +169,13 @@ RevisitReport observe_again(const FrameSource& frames, const std::vector<WallPat
   }
   for (Track& track : structure.tracks)
     std::ranges::stable_sort(track.observations, {}, &Track::Observation::keyframe);
-  set_rays(structure.tracks, frames.lens());
   return report;
 }
 
 void link_revisits(const FrameSource& frames, const RevisitOptions& options,
                    const BundleOptions& bundle, Structure& structure, Progress& progress) {
+  if (frames.shutter().rolling())
+    finish_moving(frames, bundle, kDraftAdjustment, structure, progress);
   for (int round = 0; round < options.rounds; ++round) {
     progress.begin("revisits", structure.frames.size());
     const std::vector<WallPatch> patches = make_patches(frames, structure);
@@ -179,8 +184,8 @@ void link_revisits(const FrameSource& frames, const RevisitOptions& options,
     progress.end(fmt::format(
         "{} patches, {} sights registered, {} looked for, {} found, {} accepted", report.patches,
         report.registered, report.foretold, report.found, report.accepted));
-    finish_structure(structure, frames.lens(), bundle,
-                     round + 1 < options.rounds ? kDraftAdjustment : kFinalAdjustment, progress);
+    finish_moving(frames, bundle, round + 1 < options.rounds ? kDraftAdjustment : kFinalAdjustment,
+                  structure, progress);
   }
 }
 

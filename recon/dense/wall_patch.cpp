@@ -9,7 +9,9 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "recon/dense/moving_keyframes.h"
 #include "recon/flow.h"
+#include "recon/tracks.h"
 
 namespace rugae {
 namespace {
@@ -81,10 +83,26 @@ bool cut(const cv::Mat& image, const Vec2& pixel, int half, cv::Mat& square, Vec
   return true;
 }
 
+// d (x/z, y/z) / d pixel of what lies at `depth`, at the frame's time.
+Mat2 ray_derivative(const RollingShutter& shutter, const Vec2& pixel, double depth,
+                    const CameraMotion& motion) {
+  const Lens& lens = shutter.lens();
+  Mat2 derivative = Vec2(1.0 / lens.fx, 1.0 / lens.fy).asDiagonal();
+  if (!shutter.rolling()) return derivative;
+  for (int axis = 0; axis < 2; ++axis) {
+    const Vec2 step = Vec2::Unit(axis);
+    const auto ahead = ray_of(lens, pixel + step), behind = ray_of(lens, pixel - step);
+    if (!ahead || !behind) continue;
+    derivative.col(axis) = 0.5 * (shutter.ray_at_frame_time(*ahead, depth, motion) -
+                                  shutter.ray_at_frame_time(*behind, depth, motion));
+  }
+  return derivative;
+}
+
 // Of one key frame: the patches anchored in it.
-std::vector<WallPatch> patches_of(const PatchImage& image, const Lens& lens,
-                                  const Structure& structure, int keyframe,
-                                  const std::vector<Point>& points,
+std::vector<WallPatch> patches_of(const PatchImage& image, const RollingShutter& shutter,
+                                  const CameraMotion& motion, const Structure& structure,
+                                  int keyframe, const std::vector<Point>& points,
                                   const std::vector<char>& anchored) {
   std::vector<WallPatch> patches;
   const Rigid3 world_from_cam = structure.cam_from_world[keyframe].inverse();
@@ -102,12 +120,15 @@ std::vector<WallPatch> patches_of(const PatchImage& image, const Lens& lens,
     patch.anchor_px = p.pixel;
     patch.centre = structure.tracks[static_cast<std::size_t>(p.track)].point;
     patch.normal = -(world_from_cam.rotation * normal);
-    // X = ray / (plane . ray), so dX/dx = z e_x - z^2 a ray.
+    // X = ray / (plane . ray), so dX/dx = z e_x - z^2 a ray for the ray's x.
     const double z = p.depth;
-    patch.along_x =
-        world_from_cam.rotation * (z * Vec3::UnitX() - z * z * plane->x() * ray) / lens.fx;
-    patch.along_y =
-        world_from_cam.rotation * (z * Vec3::UnitY() - z * z * plane->y() * ray) / lens.fy;
+    const Vec3 along_ray_x =
+                   world_from_cam.rotation * (z * Vec3::UnitX() - z * z * plane->x() * ray),
+               along_ray_y =
+                   world_from_cam.rotation * (z * Vec3::UnitY() - z * z * plane->y() * ray);
+    const Mat2 rays = ray_derivative(shutter, p.pixel, z, motion);
+    patch.along_x = along_ray_x * rays(0, 0) + along_ray_y * rays(1, 0);
+    patch.along_y = along_ray_x * rays(0, 1) + along_ray_y * rays(1, 1);
     if (!cut(image.fine, p.pixel / image.fine_shrink, kFineHalfPx, patch.fine, patch.fine_px))
       continue;
     if (!cut(image.coarse, p.pixel / image.coarse_shrink, kCoarseHalfPx, patch.coarse,
@@ -145,20 +166,22 @@ PatchImage prepare_patch_image(const Frame& frame) {
   return image;
 }
 
-std::optional<PatchSight> foretell(const WallPatch& patch, const Rigid3& cam_from_world,
-                                   const LensProjector& lens) {
+std::optional<PatchSight> foretell(const WallPatch& patch, const MovingPose& camera,
+                                   const RollingShutter& shutter) {
+  const Rigid3& cam_from_world = camera.cam_from_world;
   const Vec3 p_cam = cam_from_world * patch.centre;
   if (!(p_cam.z() > 0.0)) return std::nullopt;
   const Vec3 normal_cam = cam_from_world.rotation * patch.normal;
   if (!(-normal_cam.dot(p_cam.normalized()) >= kMinIncidence)) return std::nullopt;
-  const auto pixel = lens.project(p_cam);
-  if (!pixel || !lens.contains(*pixel)) return std::nullopt;
+  const auto pixel = shutter.project(p_cam, camera.motion);
+  if (!pixel || !shutter.lens().contains(*pixel)) return std::nullopt;
   PatchSight sight{*pixel, Mat2::Zero()};
   const Vec3 x_cam = cam_from_world.rotation * patch.along_x,
              y_cam = cam_from_world.rotation * patch.along_y;
   for (int axis = 0; axis < 2; ++axis) {
     const Vec3& step = axis == 0 ? x_cam : y_cam;
-    const auto ahead = lens.project(p_cam + step), behind = lens.project(p_cam - step);
+    const auto ahead = shutter.project(p_cam + step, camera.motion),
+               behind = shutter.project(p_cam - step, camera.motion);
     if (!ahead || !behind) return std::nullopt;
     sight.linear.col(axis) = 0.5 * (*ahead - *behind);
   }
@@ -182,13 +205,14 @@ std::vector<WallPatch> make_patches(const FrameSource& frames, const Structure& 
       anchored[o.keyframe].push_back(i == middle);
     }
   }
+  const std::vector<CameraMotion> motions = keyframe_motions(frames, structure);
   std::vector<std::vector<WallPatch>> found(n);
   for (std::size_t begin = 0; begin < n; begin += kAtOnce) {
     tbb::parallel_for(begin, std::min(n, begin + kAtOnce), [&](std::size_t k) {
       if (!structure.placed[k] || points[k].empty()) return;
       const PatchImage image = prepare_patch_image(frames.pose_frame(structure.frames[k]));
-      found[k] =
-          patches_of(image, frames.lens(), structure, static_cast<int>(k), points[k], anchored[k]);
+      found[k] = patches_of(image, frames.shutter(), motions[k], structure, static_cast<int>(k),
+                            points[k], anchored[k]);
     });
   }
   std::vector<WallPatch> patches;

@@ -49,8 +49,8 @@ struct PatchSight {
 
 /// Empty when the patch is behind the camera, outside the picture, seen from the other side or too
 /// obliquely, or at less than half or more than twice the anchor's scale.
-std::optional<PatchSight> foretell(const WallPatch& patch, const Rigid3& cam_from_world,
-                                   const LensProjector& lens);
+std::optional<PatchSight> foretell(const WallPatch& patch, const MovingPose& camera,
+                                   const RollingShutter& shutter);
 
 /// The patches of all triangulated tracks whose tangent plane their anchor's other points fix. The
 /// anchor is the track's middle observation: to no other are light, scale and view as similar.

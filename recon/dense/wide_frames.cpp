@@ -14,6 +14,11 @@ namespace {
 constexpr double kWhole = 254.5;  // of a mask averaged over a pixel's area
 constexpr float kNowhere = -10.0f;
 
+/// In OpenCV's convention, where the centre of the first pixel is (0, 0).
+cv::Vec2f place_of(const Vec2& pixel) {
+  return {static_cast<float>(pixel.x() - 0.5), static_cast<float>(pixel.y() - 0.5)};
+}
+
 /// Relative to the profile that preprocessing found on its own pixels.
 cv::Mat gain_on(const PinholeGrid& grid, const FrameSource& frames) {
   cv::Mat gain(grid.size(), CV_32F, cv::Scalar(1.0));
@@ -40,36 +45,53 @@ WideFrames::WideFrames(const FrameSource& frames, const ReflectionOptions& refle
       grid_(wide_grid(frames.observations().lens(), width_px)) {
   const Lens& lens = frames.observations().lens();
   oversampling_ = std::max(1, static_cast<int>(std::lround(lens.fx / grid_.fx)));
-  const double step = 1.0 / oversampling_;
   const LensProjector projector(lens);
   source_ = cv::Mat(grid_.height * oversampling_, grid_.width * oversampling_, CV_32FC2,
                     cv::Scalar::all(kNowhere));
   for (int y = 0; y < source_.rows; ++y)
     for (int x = 0; x < source_.cols; ++x) {
-      const Vec3 ray((step * (x + 0.5) - grid_.cx) / grid_.fx,
-                     (step * (y + 0.5) - grid_.cy) / grid_.fy, 1.0);
-      if (const auto pixel = projector.project(ray); pixel && lens.contains(*pixel))
-        source_.at<cv::Vec2f>(y, x) = {static_cast<float>(pixel->x() - 0.5),
-                                       static_cast<float>(pixel->y() - 0.5)};
+      if (const auto pixel = projector.project(ray(x, y)); pixel && lens.contains(*pixel))
+        source_.at<cv::Vec2f>(y, x) = place_of(*pixel);
     }
   gain_ = gain_on(grid_, frames);
 }
 
-cv::Mat WideFrames::straightened(const cv::Mat& picture) const {
+Vec3 WideFrames::ray(int x, int y) const {
+  const double step = 1.0 / oversampling_;
+  return {(step * (x + 0.5) - grid_.cx) / grid_.fx, (step * (y + 0.5) - grid_.cy) / grid_.fy, 1.0};
+}
+
+cv::Mat WideFrames::straightened(const cv::Mat& picture, const cv::Mat& source) const {
   cv::Mat large, wide, small;
-  cv::remap(picture, large, source_, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+  cv::remap(picture, large, source, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
   large.convertTo(wide, CV_32F);
   cv::resize(wide, small, grid_.size(), 0.0, 0.0, cv::INTER_AREA);
   return small;
 }
 
-WideFrame WideFrames::read(int index) const {
+WideFrame WideFrames::read(int index) const { return read(index, source_); }
+
+WideFrame WideFrames::read(int index, const CameraMotion& motion, const cv::Mat& depth) const {
+  const RollingShutter& shutter = frames_.shutter();
+  cv::Mat finer, source(source_.size(), CV_32FC2, cv::Scalar::all(kNowhere));
+  cv::resize(depth, finer, source.size(), 0.0, 0.0, cv::INTER_LINEAR);
+  for (int y = 0; y < source.rows; ++y)
+    for (int x = 0; x < source.cols; ++x) {
+      const auto seen = shutter.when_seen(finer.at<float>(y, x) * ray(x, y), motion);
+      const auto pixel = seen ? shutter.project_original(*seen) : std::nullopt;
+      if (pixel && shutter.original().contains(*pixel))
+        source.at<cv::Vec2f>(y, x) = place_of(*pixel);
+    }
+  return read(index, source);
+}
+
+WideFrame WideFrames::read(int index, const cv::Mat& source) const {
   const cv::Mat bgr = frames_.observations().image(index);
   cv::Mat gray;
   cv::cvtColor(bgr, gray, cv::COLOR_BGR2GRAY);
   const cv::Mat reflection = detect_reflections(gray, reflections_, frames_.field());
   const cv::Mat known = frames_.field() & ~reflection;
-  return {straightened(bgr), straightened(known) > kWhole};
+  return {straightened(bgr, source), straightened(known, source) > kWhole};
 }
 
 }  // namespace rugae

@@ -23,11 +23,19 @@ class WideFrames {
 
   const PinholeGrid& grid() const { return grid_; }
   WideFrame read(int index) const;
+  /// A key frame whose rows were read one after another, as the camera would have seen it had it
+  /// stood still from the frame's time on. `depth`: CV_32F, of the wall at that time, any number of
+  /// pixels over the grid's view; where it is wrong by a share, so is what the camera's shift
+  /// moved.
+  WideFrame read(int index, const CameraMotion& motion, const cv::Mat& depth) const;
   /// 1 / V on the grid, CV_32F: what undoes the vignetting of levels as the camera gave them.
   const cv::Mat& vignetting_gain() const { return gain_; }
 
  private:
-  cv::Mat straightened(const cv::Mat& picture) const;
+  WideFrame read(int index, const cv::Mat& source) const;
+  cv::Mat straightened(const cv::Mat& picture, const cv::Mat& source) const;
+  /// Vector through a place of `source_`, z = 1.
+  Vec3 ray(int x, int y) const;
 
   const FrameSource& frames_;
   ReflectionOptions reflections_;

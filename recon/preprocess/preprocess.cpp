@@ -25,6 +25,7 @@ struct FrameSource::Impl {
   PreprocessOptions options;
   Lens lens;
   std::optional<Undistortion> undistortion;
+  std::optional<RollingShutter> shutter;
   cv::Mat field;  // of the observations: 255 inside the field stop
   cv::Mat valid;
   cv::Mat gain;  // 1 / V; empty when switched off
@@ -47,6 +48,7 @@ struct FrameSource::Impl {
     } else {
       valid = field;
     }
+    shutter.emplace(lens, original, observations.row_time_s());
     if (options.devignette) estimate_gain();
   }
 
@@ -123,6 +125,7 @@ FrameSource::~FrameSource() = default;
 int FrameSource::size() const { return impl_->observations.size(); }
 const Lens& FrameSource::lens() const { return impl_->lens; }
 const Observations& FrameSource::observations() const { return impl_->observations; }
+const RollingShutter& FrameSource::shutter() const { return *impl_->shutter; }
 const cv::Mat& FrameSource::field() const { return impl_->field; }
 const cv::Mat& FrameSource::valid() const { return impl_->valid; }
 const std::vector<double>& FrameSource::vignetting_profile() const { return impl_->profile; }

@@ -9,6 +9,7 @@
 #include "cameras/camera.h"
 #include "dataset/observations.h"
 #include "recon/options.h"
+#include "recon/rolling_shutter.h"
 
 namespace rugae {
 
@@ -38,6 +39,9 @@ class FrameSource {
   /// undistortion is off).
   const Lens& lens() const;
   const Observations& observations() const;
+  /// Which row of the sensor each place of the preprocessed frames comes from, and when it was
+  /// read.
+  const RollingShutter& shutter() const;
   /// CV_8U, on the grid of the observations: 255 inside the field stop.
   const cv::Mat& field() const;
   /// Frame::valid, the same for all frames.

@@ -97,6 +97,34 @@ TEST(Observations, ACalibrationGivenOverridesTheDatasets) {
             43.0);
 }
 
+// How long rows take is the sensor's, not the lens': a lens calibrated anew does not lose it.
+TEST(Observations, TheTimeOfARowIsTheFilesThatSaysIt) {
+  const TemporaryFolder folder("obs_rows");
+  const fs::path images = folder.path() / "images", lens = folder.path() / "lens.yaml";
+  write_images(images, 3);
+  const Lens plain = PlaneWorld().camera.lens;  // 48 rows
+  const auto row_time_us = [&] {
+    return 1e6 * Observations::open(images, lens, 25.0).row_time_s();
+  };
+  write_atomic(lens, lens_yaml(plain, ""));
+  EXPECT_EQ(row_time_us(), 0.0);
+  write_atomic(images / "calibration.yaml", lens_yaml(plain, "", 250.0));
+  EXPECT_DOUBLE_EQ(row_time_us(), 250.0);
+  EXPECT_DOUBLE_EQ(1e6 * Observations::open(images, {}, 25.0).row_time_s(), 250.0);
+  write_atomic(lens, lens_yaml(plain, "", 500.0));
+  EXPECT_DOUBLE_EQ(row_time_us(), 500.0);
+  write_atomic(lens, lens_yaml(plain, "") + "row_time_us: 0\n");
+  EXPECT_EQ(row_time_us(), 0.0);
+
+  write_atomic(lens, lens_yaml(plain, "", 900.0));
+  EXPECT_EQ(error_of(row_time_us), lens.string() +
+                                       ": row_time_us is 900, 48 rows take 0.0432 s, but frames "
+                                       "are 0.04 s apart");
+  write_atomic(lens, "row_time_us: -1\n" + lens_yaml(plain, ""));
+  EXPECT_EQ(error_of(row_time_us),
+            lens.string() + ":1:14: row_time_us is -1, expected 0 (a global shutter) or above");
+}
+
 TEST(Observations, WhatIsMissingIsNamed) {
   const TemporaryFolder folder("obs_errors");
   const auto calibration = write_calibration(folder.path());

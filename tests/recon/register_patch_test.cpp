@@ -93,13 +93,12 @@ TEST_P(RegisterPatch, FindsThePlaceFromAWrongGuess) {
   ASSERT_GE(patches.size(), structure_.tracks.size() * 3 / 4);
   const PatchImage image = prepare_patch_image(frames.pose_frame(1));
   const PatchRegistrar registrar(lens());
-  const LensProjector projector(lens());
   // The camera is thought to stand aside by a hundredth of the width.
   Rigid3 guess = structure_.cam_from_world[1];
   guess.translation += Vec3(0.01, -0.008, 0.0) / kFocal;
   int found = 0;
   for (const WallPatch& patch : patches) {
-    const auto sight = foretell(patch, guess, projector);
+    const auto sight = foretell(patch, {guess, {}}, frames.shutter());
     if (!sight) continue;
     EXPECT_LT((sight->linear - Mat2::Identity()).norm(), 1e-6);
     const auto pixel = registrar.find(patch, *sight, image, 0.0375 * width());
@@ -127,11 +126,10 @@ TEST_P(RegisterNoisyPatch, SettlesThreeInFour) {
   ASSERT_GE(patches.size(), structure_.tracks.size() * 3 / 4);
   const PatchImage image = prepare_patch_image(frames.pose_frame(1));
   const PatchRegistrar registrar(lens());
-  const LensProjector projector(lens());
   int settled = 0;
   double square = 0.0;
   for (const WallPatch& patch : patches) {
-    const auto sight = foretell(patch, structure_.cam_from_world[1], projector);
+    const auto sight = foretell(patch, {structure_.cam_from_world[1], {}}, frames.shutter());
     if (!sight) continue;
     const auto pixel = registrar.settle(patch, *sight, image, sight->pixel + Vec2(0.4, -0.3));
     if (!pixel) continue;

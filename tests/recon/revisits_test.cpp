@@ -85,13 +85,13 @@ Structure Revisits::chain_;
 TEST_F(Revisits, PatchesAreForetoldWhereTheirWallIsSeen) {
   const auto patches = make_patches(frames(), chain_);
   ASSERT_GT(patches.size(), chain_.tracks.size() / 2);
-  const LensProjector lens(world_.lens);
+  const RollingShutter shutter(world_.lens, world_.lens, 0.0);
   int sights = 0;
   double sum = 0.0;
   for (const WallPatch& patch : patches) {
     const Track& track = chain_.tracks[static_cast<std::size_t>(patch.track)];
     for (const auto& o : track.observations) {
-      const auto sight = foretell(patch, chain_.cam_from_world[o.keyframe], lens);
+      const auto sight = foretell(patch, {chain_.cam_from_world[o.keyframe], {}}, shutter);
       if (!sight) continue;
       EXPECT_LT((sight->pixel - o.pixel).norm(), 3.5);  // what the adjustment let pass, 3 px
       if (o.keyframe == patch.anchor) {

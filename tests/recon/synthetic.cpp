@@ -111,11 +111,26 @@ double angle_of(const Options& options, int camera) {
   return options.step_rad * (back ? 2 * options.turn_at - camera - 1.5 : camera);
 }
 
+RowPoses rows_of(const Options& options, int camera) {
+  const int height = options.width * 3 / 4;
+  if (options.readout_share == 0.0) return RowPoses(world_from_camera(angle_of(options, camera)));
+  std::vector<Rigid3> poses;
+  for (int row = -1; row <= height; ++row)
+    poses.push_back(
+        world_from_camera(angle_of(options, camera) +
+                          options.step_rad * options.readout_share * ((row + 0.5) / height - 0.5)));
+  constexpr double kFps = 30.0;
+  return {std::move(poses), options.readout_share / (kFps * height)};
+}
+
 World make_world(const Options& options) {
   World world;
   world.lens = lens_of(options.width, options.width * 3 / 4);
   std::vector<Rigid3> cam_from_world_mm;
+  std::vector<RowPoses> rows;
+  const LensProjector projector(world.lens);
   for (int k = 0; k < options.cameras; ++k) {
+    rows.push_back(rows_of(options, k));
     cam_from_world_mm.push_back(world_from_camera(angle_of(options, k)).inverse());
     Rigid3 pose = cam_from_world_mm.back().inverse();
     pose.translation *= options.unit;
@@ -129,8 +144,8 @@ World make_world(const Options& options) {
     const Vec3 outward = outward_normal(direction);
     Track track;
     for (int k = options.first_camera; k < options.cameras; ++k) {
-      const Vec3 p_cam = cam_from_world_mm[k] * wall_mm;
-      const auto pixel = world.lens.project(p_cam);
+      const auto pixel = rows[k].landing(
+          projector, [&](double) { return wall_mm; }, 0.5 * world.lens.height);
       const Vec3 sight = (wall_mm - cam_from_world_mm[k].inverse().translation).normalized();
       const bool seen =
           pixel && world.lens.contains(*pixel) && sight.dot(outward) >= std::cos(kMaxIncidenceRad);
@@ -153,10 +168,11 @@ World make_world(const Options& options) {
   return world;
 }
 
-cv::Mat picture(const Lens& lens, const Rigid3& world_from_camera, double noise_levels,
-                std::uint64_t seed, int frame) {
+cv::Mat picture(const Lens& lens, const RowPoses& rows, double noise_levels, std::uint64_t seed,
+                int frame) {
   cv::Mat bgr(lens.height, lens.width, CV_8UC3, cv::Scalar::all(0));
   for (int y = 0; y < lens.height; ++y) {
+    const Rigid3& world_from_camera = rows.of_row(y);
     for (int x = 0; x < lens.width; ++x) {
       const auto ray = lens.unproject({x + 0.5, y + 0.5});
       if (!ray) continue;
@@ -178,9 +194,21 @@ cv::Mat picture(const Lens& lens, const Rigid3& world_from_camera, double noise_
 
 Recording record(const std::filesystem::path& folder, const Lens& lens,
                  const std::vector<Rigid3>& world_from_camera, double noise_levels) {
-  Recording recording{folder / "images", folder / "calibration.yaml", world_from_camera};
+  std::vector<RowPoses> rows;
+  for (const Rigid3& pose : world_from_camera) rows.emplace_back(pose);
+  Recording recording = record(folder, lens, rows, noise_levels);
+  recording.world_from_camera = world_from_camera;
+  return recording;
+}
+
+Recording record(const std::filesystem::path& folder, const Lens& lens,
+                 const std::vector<RowPoses>& world_from_camera, double noise_levels) {
+  Recording recording{folder / "images", folder / "calibration.yaml", {}};
   make_folder(recording.images);
-  write_atomic(recording.calibration, lens_yaml(lens, "synthetic"));
+  const double row_time_s = world_from_camera.empty() ? 0.0 : world_from_camera[0].row_time_s();
+  write_atomic(recording.calibration, lens_yaml(lens, "synthetic", 1e6 * row_time_s));
+  for (const RowPoses& rows : world_from_camera)
+    recording.world_from_camera.push_back(rows.at(0.5 * lens.height));
   for (std::size_t i = 0; i < world_from_camera.size(); ++i)
     write_image(recording.images / fmt::format("{:06}.png", i),
                 picture(lens, world_from_camera[i], noise_levels, 5, static_cast<int>(i)));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cameras/camera.h"
+#include "cameras/row_poses.h"
 #include "core/rigid3.h"
 #include "recon/structure.h"
 
@@ -22,6 +23,7 @@ struct Options {
   int points = 3000;           // on the whole wall
   int first_camera = 0;        // that sees anything
   int max_run = 12;            // cameras a track lives for at most
+  double readout_share = 0.0;  // of the time from a camera to the next; 0: all rows at once
   double noise_px = 0.0;       // standard deviation of each coordinate of an observation
   double outlier_share = 0.0;  // of observations moved by up to 40 px in each coordinate
   double unit = 1.0;           // length of the world's unit: 1000 gives the world in micrometres
@@ -43,13 +45,20 @@ double wall_radius_mm(const Vec3& direction);
 Rigid3 world_from_camera(double angle_rad);
 /// The path's angle of a camera.
 double angle_of(const Options& options, int camera);
+/// World from camera of all rows while a camera of a path without turn is read, mm; frames are 1 /
+/// 30 s apart.
+RowPoses rows_of(const Options& options, int camera);
 Lens lens_of(int width, int height);
 World make_world(const Options& options);
 
 /// What the camera sees: mottled wall under a light at the camera, 8-bit BGR. The noise is white
 /// with that standard deviation in grey levels.
-cv::Mat picture(const Lens& lens, const Rigid3& world_from_camera, double noise_levels,
+cv::Mat picture(const Lens& lens, const RowPoses& world_from_camera, double noise_levels,
                 std::uint64_t seed, int frame);
+inline cv::Mat picture(const Lens& lens, const Rigid3& world_from_camera, double noise_levels,
+                       std::uint64_t seed, int frame) {
+  return picture(lens, RowPoses(world_from_camera), noise_levels, seed, frame);
+}
 
 /// A folder of numbered pictures with a calibration file next to it, as a user would have it.
 struct Recording {
@@ -58,6 +67,9 @@ struct Recording {
 };
 Recording record(const std::filesystem::path& folder, const Lens& lens,
                  const std::vector<Rigid3>& world_from_camera, double noise_levels = 0.0);
+/// The same through a rolling shutter.
+Recording record(const std::filesystem::path& folder, const Lens& lens,
+                 const std::vector<RowPoses>& world_from_camera, double noise_levels);
 
 /// Root mean square distance of estimated camera centres to the true ones after the best Sim(3),
 /// and the largest error of the turn from the first camera to another (a short path fixes the whole

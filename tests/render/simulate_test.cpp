@@ -76,6 +76,7 @@ TEST_F(Simulate, AMovingWallThroughARollingShutter) {
   const Truth truth = Truth::open(root_ / "whole");
   const RowPoses rows = truth.row_poses(3);
   ASSERT_TRUE(rows.rolling());
+  EXPECT_DOUBLE_EQ(1e6 * Observations::open(root_ / "whole").row_time_s(), 500.0);
   EXPECT_EQ(rows.poses().size(), 50u);
   EXPECT_NEAR((rows.at(24.0).translation - truth.track()[3].world_from_camera.translation).norm(),
               0.0, 1e-3);
@@ -119,6 +120,7 @@ TEST_F(Simulate, AMovingWallThroughARollingShutter) {
   options_.render.lens.rolling_shutter = false;
   run("at once");
   EXPECT_FALSE(fs::exists(DatasetLayout{root_ / "at once"}.row_poses(0)));
+  EXPECT_EQ(Observations::open(root_ / "at once").row_time_s(), 0.0);
   EXPECT_EQ(check_dataset(root_ / "at once").problems, std::vector<std::string>{});
   EXPECT_EQ(read_text(DatasetLayout{root_ / "at once"}.wall_motion(2)),
             read_text(layout.wall_motion(2)));
