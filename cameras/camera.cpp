@@ -202,6 +202,7 @@ Calibration load_calibration(const std::filesystem::path& file) {
     check(row_time_us >= 0.0, "{}: row_time_us is {}, expected 0 (a global shutter) or above",
           yaml.where("row_time_us"), row_time_us);
   }
+  if (yaml.has("lights")) calibration.lights = read_lights(yaml);
   calibration.lens = read_lens(std::move(yaml), file.string());
   return calibration;
 }
@@ -241,11 +242,18 @@ std::string lens_lines(const Lens& lens, const std::string& indent) {
 
 }  // namespace
 
-std::string lens_yaml(const Lens& lens, const std::string& comment, double row_time_us) {
+std::string calibration_yaml(const Calibration& calibration, const std::string& comment) {
   std::string text = comment.empty() ? "" : "# " + comment + "\n";
-  text += "# pixels; the centre of the first pixel is (0.5, 0.5)\n" + lens_lines(lens, "");
-  if (row_time_us > 0.0) text += fmt::format("row_time_us: {:.17g}\n", row_time_us);
+  text +=
+      "# pixels; the centre of the first pixel is (0.5, 0.5)\n" + lens_lines(calibration.lens, "");
+  if (calibration.row_time_us)
+    text += fmt::format("row_time_us: {:.17g}\n", *calibration.row_time_us);
+  if (calibration.lights) text += lights_yaml(*calibration.lights);
   return text;
+}
+
+std::string lens_yaml(const Lens& lens, const std::string& comment) {
+  return calibration_yaml({lens, {}, {}}, comment);
 }
 
 std::string camera_yaml(const Camera& camera) {

@@ -135,11 +135,14 @@ struct Calibration {
   /// From a row to the next below, key row_time_us, which a sensor's data sheet states; empty where
   /// the file does not say, 0 for a global shutter.
   std::optional<double> row_time_us;
+  /// Key lights, which a capsule's drawing states; empty where the file does not say.
+  std::optional<std::vector<Emitter>> lights;
 };
 Calibration load_calibration(const std::filesystem::path& file);
-/// Its lens alone.
+/// What load_calibration reads back to the same values.
+std::string calibration_yaml(const Calibration& calibration, const std::string& comment);
+/// The lens alone.
 Lens load_lens(const std::filesystem::path& file);
-/// Without the row time where it is 0.
-std::string lens_yaml(const Lens& lens, const std::string& comment, double row_time_us = 0.0);
+std::string lens_yaml(const Lens& lens, const std::string& comment);
 
 }  // namespace rugae

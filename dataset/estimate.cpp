@@ -70,6 +70,8 @@ json info_of(const Estimate& estimate) {
     check(!options.is_discarded(), "the options of the estimate are not JSON: {}",
           estimate.options_json);
   }
+  json units = {{"length", estimate.scale_sigma_share ? "mm" : "map units"}, {"time", "s"}};
+  if (estimate.scale_sigma_share) units["length_sigma_share"] = *estimate.scale_sigma_share;
   return {{"method", estimate.method},
           {"frames", estimate.times_s.size()},
           {"keyframe", count(estimate, FrameState::keyframe)},
@@ -78,7 +80,7 @@ json info_of(const Estimate& estimate) {
           {"numbers", estimate.numbers},
           {"stages", stages},
           {"options", options},
-          {"units", {{"length", "map units"}, {"time", "s"}}}};
+          {"units", units}};
 }
 
 // JSON has no NaN: nlohmann writes null for it.
@@ -97,6 +99,9 @@ void read_numbers(const fs::path& file, Estimate& estimate) {
       estimate.stages.push_back({stage.at("name").get<std::string>(), number(stage.at("seconds")),
                                  number(stage.at("peak_rss_mb"))});
     estimate.options_json = object.at("options").dump();
+    const json& units = object.at("units");
+    if (units.at("length") == "mm")
+      estimate.scale_sigma_share = number(units.at("length_sigma_share"));
   } catch (const json::exception& error) {
     fail("{}: not the description of an estimate: {}", file.string(), error.what());
   }

@@ -12,11 +12,13 @@
 //     (distorted)
 //                                frame; NaN: unknown
 //     pictures/<stage>/<name>.png   intermediates for people
-// Map units are what the reconstruction chose: their length in mm is unknown unless it says so.
+// Map units are what the reconstruction chose: their length in mm is unknown unless it says so
+// (units.length of estimate.json is "mm" then, and units.length_sigma_share how well it knows).
 
 #include <filesystem>
 #include <map>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,6 +43,8 @@ struct Estimate {
   std::map<std::string, double>
       numbers;  // counts and errors a reader wants: keyframes, tracks, mean_reprojection_px, ...
   std::string options_json;
+  /// Lengths are in mm, all of them off by one factor of this standard deviation; empty: map units.
+  std::optional<double> scale_sigma_share;
 
   /// The tracked frames, in order of time.
   PoseTrack track() const;

@@ -115,8 +115,12 @@ Observations Observations::open(const fs::path& folder, const fs::path& calibrat
 
   Observations observations;
   Calibration chosen = load_calibration(source.calibration);
-  if (!chosen.row_time_us && fs::exists(own))
-    chosen.row_time_us = load_calibration(own).row_time_us;
+  if (source.calibration != own && fs::exists(own)) {
+    const Calibration of_dataset = load_calibration(own);
+    if (!chosen.row_time_us) chosen.row_time_us = of_dataset.row_time_us;
+    if (!chosen.lights) chosen.lights = of_dataset.lights;
+  }
+  observations.lights_ = chosen.lights.value_or(std::vector<Emitter>{});
   observations.lens_ = chosen.lens;
   observations.row_time_s_ = checked_row_time_s(chosen, source.calibration, source.times_s);
   observations.files_ = std::move(source.files);

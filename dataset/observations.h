@@ -18,10 +18,11 @@ class Observations {
  public:
   /// A dataset's folder (its observations/ part is used), an observations folder itself, or a plain
   /// folder of images (PNG, JPEG, BMP; by natural order of names) together with a calibration file.
-  /// `calibration` overrides the dataset's own; where it does not say how long the rows take, the
-  /// dataset's own does. Times come from frames.csv; a plain folder gets index / `fps`. Throws
-  /// Error for an empty folder, a missing calibration ("... give one with --calibration"), images
-  /// of another size than the lens, rows that take longer than a frame, fewer than two frames.
+  /// `calibration` overrides the dataset's own, which still says how long the rows take and where
+  /// the lights are where the other does not. Times come from frames.csv; a plain folder gets index
+  /// / `fps`. Throws Error for an empty folder, a missing calibration ("... give one with
+  /// --calibration"), images of another size than the lens, rows that take longer than a frame,
+  /// fewer than two frames.
   static Observations open(const std::filesystem::path& folder,
                            const std::filesystem::path& calibration = {}, double fps = 30.0);
 
@@ -32,6 +33,8 @@ class Observations {
   const std::vector<double>& times_s() const { return times_s_; }
   /// From a row to the next below; 0 for a global shutter.
   double row_time_s() const { return row_time_s_; }
+  /// Empty where nothing says where they are.
+  const std::vector<Emitter>& lights() const { return lights_; }
   const std::filesystem::path& file(int index) const { return files_[index]; }
   /// CV_8UC3, BGR; read from disk at each call (memory does not grow with the number of frames);
   /// checked against the lens' size.
@@ -42,6 +45,7 @@ class Observations {
   std::string name_;
   Lens lens_;
   double row_time_s_ = 0.0;
+  std::vector<Emitter> lights_;
   std::vector<std::filesystem::path> files_;
   std::vector<double> times_s_;
 };

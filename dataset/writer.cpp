@@ -192,9 +192,11 @@ void DatasetWriter::write_scene(const Camera& camera, const PoseTrack& track,
   };
   write_same(layout_.camera(), camera_yaml(camera));
   write_same(layout_.trajectory(), tum_text(track));
-  write_same(layout_.calibration(),
-             lens_yaml(camera.lens, "calibration of " + camera.name,
-                       info_.truth.row_poses ? camera.sensor.row_time_us : 0.0));
+  Calibration calibration{camera.lens, {}, {}};
+  if (info_.truth.row_poses) calibration.row_time_us = camera.sensor.row_time_us;
+  if (std::ranges::any_of(camera.lights, [](const Emitter& light) { return !light.central(); }))
+    calibration.lights = camera.lights;
+  write_same(layout_.calibration(), calibration_yaml(calibration, "calibration of " + camera.name));
   check(!fs::exists(layout_.wall()) || same_mesh(read_ply(layout_.wall()), wall),
         "{}: differs from this run's; choose another folder or remove it", layout_.wall().string());
   write_ply(layout_.wall(), wall, true);

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/srgb.h"
+
 namespace rugae {
 namespace {
 
@@ -58,11 +60,8 @@ struct Window {
   }
 };
 
-// IEC 61966-2-1. Where a camera's curve is another one the model's q makes up for it.
-double linear_from_srgb(int level) {
-  const double v = level / 255.0;
-  return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
-}
+// Where a camera's curve is not sRGB's the model's q makes up for it.
+double linear_from_level(int level) { return linear_from_srgb(level / 255.0); }
 
 // Empty where there is no contrast.
 Window cut_window(const cv::Mat& gray, int middle_x, int middle_y, int half) {
@@ -76,11 +75,11 @@ Window cut_window(const cv::Mat& gray, int middle_x, int middle_y, int half) {
       darkest = std::min(darkest, level);
       brightest = std::max(brightest, level);
       const double apart = kFocus * half;
-      window.pixels.push_back({double(x), double(y), linear_from_srgb(level),
+      window.pixels.push_back({double(x), double(y), linear_from_level(level),
                                std::exp(-0.25 * (x * x + y * y) / (apart * apart))});
     }
   if (brightest - darkest < kLeastSpan) return {};
-  const double span = 0.5 * (linear_from_srgb(brightest) - linear_from_srgb(darkest));
+  const double span = 0.5 * (linear_from_level(brightest) - linear_from_level(darkest));
   for (Window::Pixel& pixel : window.pixels) pixel.value /= span;
   return window;
 }

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kFormat = "rugae motion 1";
+constexpr const char* kFormat = "rugae motion 2";
 
 json row_of(const Rigid3& pose) {
   const Quat& q = pose.rotation;
@@ -109,6 +109,7 @@ json json_of(const Structure& s) {
   for (const Rigid3& pose : s.cam_from_world) poses.push_back(row_of(pose));
   for (const Track& track : s.tracks) tracks.push_back(json_of(track));
   return {{"frames", s.frames},
+          {"scale_sigma_share", s.scale_sigma_share ? json(*s.scale_sigma_share) : json()},
           {"placed", s.placed},
           {"cam_from_world", poses},
           {"tracks", tracks},
@@ -126,6 +127,7 @@ Structure structure_of(const json& node) {
   s.mean_reprojection_px = node.at("mean_reprojection_px");
   s.iterations = node.at("iterations");
   s.converged = node.at("converged");
+  if (!node.at("scale_sigma_share").is_null()) s.scale_sigma_share = node.at("scale_sigma_share");
   return s;
 }
 

@@ -78,6 +78,7 @@ Estimate estimate_of(const Observations& observations, const ReconOptions& optio
   e.method = options.method;
   e.options_json = to_json_text(options);
   e.lens = observations.lens();
+  e.scale_sigma_share = structure.scale_sigma_share;
   e.states.assign(poses.size(), FrameState::lost);
   e.world_from_camera.assign(poses.size(), Rigid3{});
   for (std::size_t i = 0; i < poses.size(); ++i) {

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "recon/dense/frame_poses.h"
+#include "recon/dense/metric_scale.h"
 #include "recon/dense/revisits.h"
 #include "recon/resection.h"
 
@@ -22,6 +23,8 @@ Stages::Stages()
             build_structure(keyframes, std::move(tracks), frames.lens(), options.bundle,
                             linked ? kDraftAdjustment : kFinalAdjustment, progress);
         if (linked) link_revisits(frames, options.revisits, options.bundle, found, progress);
+        if (options.method == "dense")
+          scale_by_light(frames, options.preprocess.reflections, found, progress);
         return found;
       }),
       resect([](const FrameSource& frames, const Structure& structure, const ReconOptions& options,

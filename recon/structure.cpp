@@ -167,6 +167,11 @@ void normalise(Structure& s) {
   for (Track& track : s.tracks) track.point = moved * track.point;
 }
 
+void rescale(Structure& s, double factor) {
+  for (Rigid3& pose : s.cam_from_world) pose.translation *= factor;
+  for (Track& track : s.tracks) track.point *= factor;
+}
+
 void settle_structure(Structure& s, double focal_px) {
   for (Track& track : s.tracks)
     std::erase_if(track.observations,

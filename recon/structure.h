@@ -2,6 +2,7 @@
 // Poses of the key frames and sparse points: tracks from the inlier correspondences, incremental
 // start, bundle adjustment.
 
+#include <optional>
 #include <vector>
 
 #include "cameras/camera.h"
@@ -27,6 +28,7 @@ struct Track {
 
 /// Key frame poses and points. The world is the camera of the first key frame that was placed, and
 /// the map unit is the median depth of the points that camera sees: one camera fixes no scale.
+/// Light may (recon/dense/metric_scale.h).
 struct Structure {
   std::vector<int> frames;             // of the key frames, as selected
   std::vector<bool> placed;            // false: this key frame could not be placed
@@ -35,6 +37,8 @@ struct Structure {
   double mean_reprojection_px = 0.0;
   int iterations = 0;
   bool converged = false;
+  /// Where the unit is the millimetre: standard deviation of all lengths together, as a share.
+  std::optional<double> scale_sigma_share;
 
   int placed_count() const;
 };
@@ -74,5 +78,8 @@ void settle_structure(Structure& structure, double focal_px);
 /// Moves the world into the camera of the first placed key frame and scales it so that the median
 /// depth of the points it sees is one.
 void normalise(Structure& structure);
+
+/// All lengths times `factor`.
+void rescale(Structure& structure, double factor);
 
 }  // namespace rugae

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 // Raised when the same settings give other frames or labels, or other estimates and metrics of the
 // same frames, so that older ones are not taken for new.
-constexpr int kRenderingVersion = 3, kResultsVersion = 6;
+constexpr int kRenderingVersion = 3, kResultsVersion = 7;
 constexpr std::size_t kHashLetters = 10;
 
 // A preset may build on another of its kind, so all of them count, and a file on other files.
@@ -46,9 +46,12 @@ json dataset_key(const Variant& variant, const Cell& cell, const std::string& ca
               {"first", s.first},
               {"seed", cell.seed},
               {"render", json::parse(settings_json(s.render))}};
-  // Theirs are told apart from those made before they said how long a row takes.
-  if (s.render.lens.rolling_shutter && load_camera(camera).sensor.shutter == Shutter::rolling)
+  // Datasets of these are told apart from those made before calibration.yaml said as much.
+  const Camera loaded = load_camera(camera);
+  if (s.render.lens.rolling_shutter && loaded.sensor.shutter == Shutter::rolling)
     key["row_time"] = true;
+  if (std::ranges::any_of(loaded.lights, [](const Emitter& light) { return !light.central(); }))
+    key["lights"] = true;
   return key;
 }
 

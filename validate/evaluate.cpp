@@ -156,6 +156,15 @@ json coverage_json(const Visibility& visibility) {
   return out;
 }
 
+// Of an estimate in mm: how much too long all lengths are, and how well it said it knew.
+json scale_json(const Estimate& estimate, const PoseErrors& poses) {
+  if (!estimate.scale_sigma_share || !poses.sim3) return nullptr;
+  const double error_share = 1.0 / poses.sim3->truth_from_estimate.scale - 1.0;
+  return {{"error_share", error_share},
+          {"sigma_share", *estimate.scale_sigma_share},
+          {"error_over_sigma", std::abs(error_share) / *estimate.scale_sigma_share}};
+}
+
 // The map against the wall that was seen: placed by the trajectory, then by ICP from there.
 json surface_errors(const Estimate& estimate, const TriangleMesh& seen, const PoseErrors& poses) {
   json out = {{"trajectory_aligned", nullptr},
@@ -207,6 +216,7 @@ json evaluate(const fs::path& dataset, const fs::path& estimate_folder, Progress
   out["tracking"] = tracking_json(poses, estimate);
   out["alignment"] =
       transform_json(poses.sim3 ? std::optional(poses.sim3->truth_from_estimate) : std::nullopt);
+  out["scale"] = scale_json(estimate, poses);
   out["frames"] = frames_json(truth, estimate, poses);
   progress.end();
 

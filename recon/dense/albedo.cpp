@@ -6,18 +6,11 @@
 #include <opencv2/core.hpp>
 
 #include "core/check.h"
+#include "core/srgb.h"
 #include "recon/dense/volume.h"
 
 namespace rugae {
 namespace {
-
-/// IEC 61966-2-1.
-double linear_from_srgb(double s) {
-  return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
-}
-double srgb_from_linear(double l) {
-  return l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1.0 / 2.4) - 0.055;
-}
 
 /// Incidence beyond this says more of the normal's error than of the wall: 75 degrees.
 constexpr double kMinCosine = 0.26;

@@ -69,6 +69,17 @@ TEST(Estimate, RoundTrip) {
   EXPECT_EQ(b.numbers.at("mean_reprojection_px"), a.numbers.at("mean_reprojection_px"));
   EXPECT_TRUE(std::isnan(b.numbers.at("unknown")));
   EXPECT_EQ(b.options_json, a.options_json);
+  EXPECT_FALSE(b.scale_sigma_share.has_value());
+}
+
+TEST(Estimate, InMillimetresItSaysSo) {
+  const TemporaryFolder folder("estimate_mm");
+  Estimate estimate = example();
+  estimate.scale_sigma_share = 0.0123;
+  write_estimate(folder.path() / "e", estimate);
+  EXPECT_EQ(read_estimate(folder.path() / "e").scale_sigma_share, 0.0123);
+  const std::string info = read_text(EstimateLayout{folder.path() / "e"}.info());
+  EXPECT_NE(info.find("\"length\": \"mm\""), std::string::npos) << info;
 }
 
 TEST(Estimate, TheTrackHoldsTheTrackedFramesOnly) {

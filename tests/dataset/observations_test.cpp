@@ -108,21 +108,39 @@ TEST(Observations, TheTimeOfARowIsTheFilesThatSaysIt) {
   };
   write_atomic(lens, lens_yaml(plain, ""));
   EXPECT_EQ(row_time_us(), 0.0);
-  write_atomic(images / "calibration.yaml", lens_yaml(plain, "", 250.0));
+  write_atomic(images / "calibration.yaml", calibration_yaml({plain, 250.0, {}}, ""));
   EXPECT_DOUBLE_EQ(row_time_us(), 250.0);
   EXPECT_DOUBLE_EQ(1e6 * Observations::open(images, {}, 25.0).row_time_s(), 250.0);
-  write_atomic(lens, lens_yaml(plain, "", 500.0));
+  write_atomic(lens, calibration_yaml({plain, 500.0, {}}, ""));
   EXPECT_DOUBLE_EQ(row_time_us(), 500.0);
   write_atomic(lens, lens_yaml(plain, "") + "row_time_us: 0\n");
   EXPECT_EQ(row_time_us(), 0.0);
 
-  write_atomic(lens, lens_yaml(plain, "", 900.0));
+  write_atomic(lens, calibration_yaml({plain, 900.0, {}}, ""));
   EXPECT_EQ(error_of(row_time_us), lens.string() +
                                        ": row_time_us is 900, 48 rows take 0.0432 s, but frames "
                                        "are 0.04 s apart");
   write_atomic(lens, "row_time_us: -1\n" + lens_yaml(plain, ""));
   EXPECT_EQ(error_of(row_time_us),
             lens.string() + ":1:14: row_time_us is -1, expected 0 (a global shutter) or above");
+}
+
+TEST(Observations, LightsAreTheFilesThatSaysWhereTheyAre) {
+  const TemporaryFolder folder("obs_lights");
+  const fs::path images = folder.path() / "images", lens = folder.path() / "lens.yaml";
+  write_images(images, 3);
+  const Lens plain = PlaneWorld().camera.lens;
+  write_atomic(lens, lens_yaml(plain, ""));
+  EXPECT_TRUE(Observations::open(images, lens).lights().empty());
+  const Emitter beside{Vec3(3.0, -1.0, 0.5), Vec3(0.0, 0.6, 0.8), 2.5, 0.7};
+  write_atomic(images / "calibration.yaml",
+               calibration_yaml({plain, {}, std::vector<Emitter>{beside}}, ""));
+  const auto lights = Observations::open(images, lens).lights();
+  ASSERT_EQ(lights.size(), 1u);
+  EXPECT_EQ(lights[0].offset_mm, beside.offset_mm);
+  EXPECT_LE((lights[0].axis - beside.axis).norm(), 1e-15);
+  EXPECT_EQ(lights[0].lobe, beside.lobe);
+  EXPECT_EQ(lights[0].intensity, beside.intensity);
 }
 
 TEST(Observations, WhatIsMissingIsNamed) {

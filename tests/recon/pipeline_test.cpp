@@ -111,6 +111,12 @@ TEST_F(Pipeline, TheMapIsMadeFromAMotionOnDisk) {
   EXPECT_EQ(in_halves.stages.front().name, motion.stages.front().name);
   EXPECT_EQ(in_halves.stages.back().name, "pictures");
 
+  EXPECT_FALSE(motion.structure.scale_sigma_share.has_value());
+  Motion in_mm = motion;
+  in_mm.structure.scale_sigma_share = 0.0123;
+  write_motion(root_ / "in_mm.cbor", in_mm);
+  EXPECT_EQ(read_motion(root_ / "in_mm.cbor").structure.scale_sigma_share, 0.0123);
+
   Stages blind;
   blind.depth = [](const Mosaic&, const Structure&, const Lens&, const ReconOptions&) {
     return std::optional<MosaicDepth>();

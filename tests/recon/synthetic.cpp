@@ -206,7 +206,9 @@ Recording record(const std::filesystem::path& folder, const Lens& lens,
   Recording recording{folder / "images", folder / "calibration.yaml", {}};
   make_folder(recording.images);
   const double row_time_s = world_from_camera.empty() ? 0.0 : world_from_camera[0].row_time_s();
-  write_atomic(recording.calibration, lens_yaml(lens, "synthetic", 1e6 * row_time_s));
+  Calibration calibration{lens, {}, {}};
+  if (row_time_s > 0.0) calibration.row_time_us = 1e6 * row_time_s;
+  write_atomic(recording.calibration, calibration_yaml(calibration, "synthetic"));
   for (const RowPoses& rows : world_from_camera)
     recording.world_from_camera.push_back(rows.at(0.5 * lens.height));
   for (std::size_t i = 0; i < world_from_camera.size(); ++i)
