@@ -15,14 +15,13 @@ constexpr int kRounds = 30;             // of weights and q in turn, at most
 constexpr double kSettled = 1e-5;       // share of q that a round moves it by
 constexpr double kSigmaOfMad = 1.4826;  // of normal errors
 constexpr double kWidthSpreads = 2.0;   // of the robust weights
-constexpr double kLeastSpread = 1e-3;   // of exact input
-constexpr double kStepShare =
-    1e-4;                        // of the wall's distance: the light is moved so far for a slope
-constexpr double kRidge = 1e-8;  // of all weights: gains are known up to a common factor
+constexpr double kLeastSpread = 1e-3;   // less is rounding of 8 bits
+constexpr double kFirstSpread = 0.03;   // of ln light, before it is known
+/// For a slope the light is moved by this share of the wall's distance.
+constexpr double kStepShare = 1e-4;
+constexpr double kRidge = 1e-8;       // of all weights: gains are known up to a common factor
 constexpr std::size_t kFewest = 500;  // sights that say anything
-constexpr int kShared = 4;            // powers of r^2, and Fresnel's
-
-constexpr double kFirstSpread = 0.03;  // of ln light, before it is known
+constexpr int kShared = 4;            // columns besides q's: powers of r^2, the wet layer's
 
 /// Normal equations in the columns gains, fall-off, q.
 struct Sums {
@@ -34,18 +33,19 @@ using Shared = Eigen::Matrix<double, kShared + 1, 1>;  // the columns that every
 /// ln albedo and the two tilts of the normal, of one track.
 using Own = Vec3;
 
+/// The least squares as far as q is known: linearised, weighed, its equations summed.
 class Fit {
   struct Track {
     std::size_t begin, end;  // of its sights
-    int block;
+    double normal_sigma_rad;
+    int block;  // of the jackknife: as many tracks in each, in the order of their
+                // first key frames
   };
 
  public:
-  Fit(const std::vector<LightSight>& sights, const std::vector<Emitter>& lights,
-      double normal_sigma_rad)
+  Fit(const std::vector<LightSight>& sights, const std::vector<Emitter>& lights, double factor)
       : sights_(sights),
         lights_(lights),
-        normal_sigma_rad_(normal_sigma_rad),
         shared_(sights.size()),
         own_(sights.size()),
         left_(sights.size(), 0.0),
@@ -59,7 +59,9 @@ class Fit {
       if (i - begin >= 2) {
         std::fill_n(track_of_.begin() + static_cast<std::ptrdiff_t>(begin), i - begin,
                     tracks_.size());
-        tracks_.push_back({begin, i, first});
+        tracks_.push_back(
+            {begin, i, factor * std::hypot(kLeastNormalSigmaRad, sights[begin].normal_sigma_rad),
+             first});
       }
       begin = i;
     }
@@ -90,8 +92,10 @@ class Fit {
       }
       if (weight_[i] == 0.0) weight_[i] = 1.0;
       const double r2 = sight.radius * sight.radius;
-      const double facing = -sight.normal_cam.dot(sight.p_cam.normalized());
-      shared_[i] << r2, r2 * r2, r2 * r2 * r2, std::pow(1.0 - facing, 5),
+      // The way in, from where most of the light comes, and the way out.
+      const double in = sight.normal_cam.dot(at->per_normal.normalized());
+      const double out = -sight.normal_cam.dot(sight.p_cam.normalized());
+      shared_[i] << r2, r2 * r2, r2 * r2 * r2, std::pow(1.0 - in, 5) + std::pow(1.0 - out, 5),
           (ahead->ln - behind->ln) / (2.0 * step_q);
       own_[i] = {1.0, at->per_normal.dot(sight.tangent_x_cam),
                  at->per_normal.dot(sight.tangent_y_cam)};
@@ -119,7 +123,7 @@ class Fit {
         off[i] = left_[i] - x[sights_[i].keyframe] - x.tail<kShared + 1>().dot(shared_[i]);
         right += weight_[i] * off[i] * own_[i];
       }
-      right.tail<2>() -= tilt_precision() * tilt_[track_of_[track.begin]];
+      right.tail<2>() -= tilt_precision(track) * tilt_[track_of_[track.begin]];
       const Own found = own_inverse(track) * right;
       for (std::size_t i = track.begin; i < track.end; ++i) {
         off[i] -= found.dot(own_[i]);
@@ -139,11 +143,11 @@ class Fit {
 
  private:
   // Of least squares whose residuals have the spread, and tilts their own.
-  double tilt_precision() const {
-    return spread_ * spread_ / (normal_sigma_rad_ * normal_sigma_rad_);
+  double tilt_precision(const Track& track) const {
+    return spread_ * spread_ / (track.normal_sigma_rad * track.normal_sigma_rad);
   }
   Mat3 own_inverse(const Track& track) const {
-    Mat3 normal = Vec3(kRidge, tilt_precision(), tilt_precision()).asDiagonal();
+    Mat3 normal = Vec3(kRidge, tilt_precision(track), tilt_precision(track)).asDiagonal();
     for (std::size_t i = track.begin; i < track.end; ++i)
       normal += weight_[i] * own_[i] * own_[i].transpose();
     return normal.inverse();
@@ -158,7 +162,7 @@ class Fit {
       shared_own += weight_[i] * shared_[i] * own_[i].transpose();
       right += weight_[i] * left_[i] * own_[i];
     }
-    right.tail<2>() -= tilt_precision() * tilt_[track_of_[track.begin]];
+    right.tail<2>() -= tilt_precision(track) * tilt_[track_of_[track.begin]];
     auto corner = s.h.bottomRightCorner<kShared + 1, kShared + 1>();
     for (std::size_t a = track.begin; a < track.end; ++a) {
       const double w = weight_[a];
@@ -178,7 +182,6 @@ class Fit {
 
   const std::vector<LightSight>& sights_;
   const std::vector<Emitter>& lights_;
-  const double normal_sigma_rad_;
   int gains_ = 0;
   std::vector<Track> tracks_;
   std::vector<Shared> shared_;
@@ -222,8 +225,8 @@ std::optional<double> jackknife(const std::vector<Sums>& blocks, const Sums& all
 
 std::optional<LightFit> fit_light(const std::vector<LightSight>& sights,
                                   const std::vector<Emitter>& lights, double step_q,
-                                  double normal_sigma_rad) {
-  Fit fit(sights, lights, normal_sigma_rad);
+                                  double normal_sigma_factor) {
+  Fit fit(sights, lights, normal_sigma_factor);
   LightFit found;
   std::vector<Sums> blocks;
   Sums all;
@@ -281,9 +284,9 @@ std::optional<LightScale> scale_from_light(const std::vector<LightSight>& sights
   std::nth_element(depths.begin(), middle, depths.end());
   const double step_q = kStepShare * *middle / beside_mm;
 
-  const auto found = fit_light(sights, lights, step_q, kNormalSigmaRad);
-  const auto stiffer = fit_light(sights, lights, step_q, kNormalSigmaRad / kNormalSigmaFactor);
-  const auto looser = fit_light(sights, lights, step_q, kNormalSigmaRad * kNormalSigmaFactor);
+  const auto found = fit_light(sights, lights, step_q, 1.0);
+  const auto stiffer = fit_light(sights, lights, step_q, 1.0 / kNormalSigmaFactor);
+  const auto looser = fit_light(sights, lights, step_q, kNormalSigmaFactor);
   if (!found || !stiffer || !looser || !(found->q > 0.0)) return std::nullopt;
   const auto [least, most] = std::minmax({found->q, stiffer->q, looser->q});
   LightScale scale;

@@ -30,10 +30,11 @@ std::optional<ReceivedLight> received_light(const LightSight& sight,
 
 /// Least squares, with robust weights, over q and what is not known of wall and camera:
 ///   ln level = ln albedo(track) + ln gain(key frame) + ln light(q, normal(track))
-///              + c_1 r^2 + c_2 r^4 + c_3 r^6 + c_4 (1 - cos)^5
-/// (r: the lens' fall-off; cos, of the view: what a wet layer keeps from the wall, after Schlick;
-/// normals stray from those of the patches by kNormalSigmaRad). Light tells how far the wall is
-/// only where it does not come from the camera's centre, so that the distances to both differ.
+///              + c_1 r^2 + c_2 r^4 + c_3 r^6 + c_4 ((1 - cos_in)^5 + (1 - cos_out)^5)
+/// (r: the lens' fall-off; c_4: what a wet layer keeps from the wall, after Schlick; normals stray
+/// from those of the patches by their own sigma, kLeastNormalSigmaRad at least). Light tells how
+/// far the wall is only where it does not come from the camera's centre, so that the distances to
+/// both differ.
 ///
 /// The uncertainty has two parts. The jackknife's over stretches of the path where tracks begin:
 /// neighbours share the errors of their normals and of the model. And, since a light aside looks
@@ -43,9 +44,8 @@ std::optional<ReceivedLight> received_light(const LightSight& sight,
 std::optional<LightScale> scale_from_light(const std::vector<LightSight>& sights,
                                            const std::vector<Emitter>& lights);
 
-/// Of a tangent plane through a dozen points on folds: the tilts that light asks for on rendered
-/// frames are 0.05 to 0.08 rad (median).
-inline constexpr double kNormalSigmaRad = 0.07;
+/// No tangent plane is better than this: what is between its points is not seen.
+inline constexpr double kLeastNormalSigmaRad = 0.04;
 inline constexpr double kNormalSigmaFactor = 3.0;
 /// A map unit known no better than this is left a map unit.
 inline constexpr double kMostUncertain = 0.2;

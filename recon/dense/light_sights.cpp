@@ -78,7 +78,7 @@ std::vector<LightSight> light_sights(const FrameSource& frames, const Structure&
         const Vec3 tangent = patch.normal.unitOrthogonal();
         found[k].push_back({patch.track, s.keyframe, std::log(level), *p_cam, normal_cam,
                             pose.rotation * tangent, pose.rotation * patch.normal.cross(tangent),
-                            off_axis.norm() / half_diagonal_px});
+                            patch.normal_sigma_rad, off_axis.norm() / half_diagonal_px});
       }
     });
   }

@@ -15,6 +15,7 @@ struct LightSight {
   Vec3 p_cam;                         // when its row was read, map units
   Vec3 normal_cam;                    // unit, towards the camera
   Vec3 tangent_x_cam, tangent_y_cam;  // unit, the same two of the wall in every key frame
+  double normal_sigma_rad = 0.0;
   double radius = 0.0;  // in the picture, from the principal point, over half the diagonal
 };
 

@@ -36,9 +36,15 @@ struct Point {
   double depth;
 };
 
+struct InverseDepthPlane {
+  Vec3 plane;              // plane . X = 1
+  double slope_sigma = 0;  // of a and b, by what the points stray from the plane
+};
+
 // 1 / z = a x + b y + c over rays (x, y, 1) is exact for a plane. The slope comes from the points
 // around, the plane goes through the point itself.
-std::optional<Vec3> inverse_depth_plane(const Point& centre, const std::vector<Point>& points) {
+std::optional<InverseDepthPlane> inverse_depth_plane(const Point& centre,
+                                                     const std::vector<Point>& points) {
   std::vector<std::pair<double, const Point*>> near;
   for (const Point& p : points)
     if (p.track != centre.track) near.emplace_back((p.pixel - centre.pixel).squaredNorm(), &p);
@@ -49,6 +55,7 @@ std::optional<Vec3> inverse_depth_plane(const Point& centre, const std::vector<P
       });
   std::vector<double> weight(kPlanePoints, 1.0);
   Vec2 slope = Vec2::Zero();
+  double slope_sigma = 0.0;
   const double inverse = 1.0 / centre.depth;
   for (int round = 0; round < kPlaneRounds; ++round) {
     Mat2 normal = Mat2::Zero();
@@ -63,14 +70,19 @@ std::optional<Vec3> inverse_depth_plane(const Point& centre, const std::vector<P
     const double smallest = solver.vectorD().minCoeff(), largest = solver.vectorD().maxCoeff();
     if (!(smallest > 1e-3 * largest)) return std::nullopt;  // all on a line
     slope = solver.solve(right);
+    double square = 0.0, all = 0.0;
     for (int i = 0; i < kPlanePoints; ++i) {
       const Point& p = *near[static_cast<std::size_t>(i)].second;
-      const double off =
-          (1.0 / p.depth - inverse - slope.dot(p.ray - centre.ray)) * centre.depth / kPlaneShare;
+      const double left = 1.0 / p.depth - inverse - slope.dot(p.ray - centre.ray);
+      const double off = left * centre.depth / kPlaneShare;
+      square += weight[i] * left * left;
+      all += weight[i];
       weight[i] = 1.0 / (1.0 + off * off);
     }
+    slope_sigma = std::sqrt(0.5 * solver.solve(Mat2::Identity()).trace() * square * kPlanePoints /
+                            (all * (kPlanePoints - 2.0)));
   }
-  return Vec3(slope.x(), slope.y(), inverse - slope.dot(centre.ray));
+  return InverseDepthPlane{{slope.x(), slope.y(), inverse - slope.dot(centre.ray)}, slope_sigma};
 }
 
 // A whole-pixel square around a point and the point's place in it; false when it leaves the image.
@@ -109,10 +121,11 @@ std::vector<WallPatch> patches_of(const PatchImage& image, const RollingShutter&
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!anchored[i]) continue;
     const Point& p = points[i];
-    const auto plane = inverse_depth_plane(p, points);
-    if (!plane) continue;
+    const auto found = inverse_depth_plane(p, points);
+    if (!found) continue;
+    const Vec3& plane = found->plane;
     const Vec3 ray(p.ray.x(), p.ray.y(), 1.0);
-    const Vec3 normal = plane->normalized();  // away from the camera: plane . X = 1
+    const Vec3 normal = plane.normalized();  // away from the camera: plane . X = 1
     if (!(normal.dot(ray.normalized()) >= kMinIncidence)) continue;
     WallPatch patch;
     patch.track = p.track;
@@ -120,12 +133,13 @@ std::vector<WallPatch> patches_of(const PatchImage& image, const RollingShutter&
     patch.anchor_px = p.pixel;
     patch.centre = structure.tracks[static_cast<std::size_t>(p.track)].point;
     patch.normal = -(world_from_cam.rotation * normal);
+    patch.normal_sigma_rad = found->slope_sigma / plane.norm();
     // X = ray / (plane . ray), so dX/dx = z e_x - z^2 a ray for the ray's x.
     const double z = p.depth;
     const Vec3 along_ray_x =
-                   world_from_cam.rotation * (z * Vec3::UnitX() - z * z * plane->x() * ray),
+                   world_from_cam.rotation * (z * Vec3::UnitX() - z * z * plane.x() * ray),
                along_ray_y =
-                   world_from_cam.rotation * (z * Vec3::UnitY() - z * z * plane->y() * ray);
+                   world_from_cam.rotation * (z * Vec3::UnitY() - z * z * plane.y() * ray);
     const Mat2 rays = ray_derivative(shutter, p.pixel, z, motion);
     patch.along_x = along_ray_x * rays(0, 0) + along_ray_y * rays(1, 0);
     patch.along_y = along_ray_x * rays(0, 1) + along_ray_y * rays(1, 1);

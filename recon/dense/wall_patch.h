@@ -32,13 +32,14 @@ PatchImage prepare_patch_image(const Frame& frame);
 struct WallPatch {
   int track = -1, anchor = -1;  // places in Structure::tracks, Structure::frames
   Vec2 anchor_px;
-  Vec3 centre;            // world, map units
-  Vec3 along_x, along_y;  // d wall / d pixel of the anchor, on the tangent plane
-  Vec3 normal;            // world, unit length, towards the anchor's camera
-  cv::Mat fine;           // CV_32F square of the anchor
-  Vec2 fine_px;           // the point in it
-  cv::Mat coarse;         // CV_8U square of the anchor's coarse image
-  Vec2 coarse_px;         // the point in it
+  Vec3 centre;                    // world, map units
+  Vec3 along_x, along_y;          // d wall / d pixel of the anchor, on the tangent plane
+  Vec3 normal;                    // world, unit length, towards the anchor's camera
+  double normal_sigma_rad = 0.0;  // by what the points around stray from the tangent plane
+  cv::Mat fine;                   // CV_32F square of the anchor
+  Vec2 fine_px;                   // the point in it
+  cv::Mat coarse;                 // CV_8U square of the anchor's coarse image
+  Vec2 coarse_px;                 // the point in it
 };
 
 /// How a key frame sees a patch, by geometry alone.

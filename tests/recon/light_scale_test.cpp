@@ -62,7 +62,7 @@ std::vector<LightSight> sights_of(const World& world) {
                         ln_albedo + gain - 0.2 * r2 - 0.05 * r2 * r2 + std::log(light) +
                             world.noise_ln * draws[0],
                         p_mm / world.mm_per_unit, pose.rotation * thought, pose.rotation * tangent,
-                        pose.rotation * thought.cross(tangent), off_axis});
+                        pose.rotation * thought.cross(tangent), world.normal_error_rad, off_axis});
     }
   }
   return sights;
