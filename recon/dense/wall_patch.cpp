@@ -21,7 +21,6 @@ constexpr int kPlaneRounds = 3;         // of weighing down what lies off it
 constexpr double kPlaneShare = 0.03;    // of the depth: points further off the plane count less
 constexpr double kMinIncidence = 0.26;  // cosine, 75 degrees: more oblique pieces show nothing
 constexpr double kMinScale = 0.5, kMaxScale = 2.0;
-constexpr double kBorderPx = 2.0;
 constexpr int kFineHalfPx = 17;      // of the squares that are kept: a patch, its gradient
 constexpr int kCoarseHalfPx = 10;    // half a search template seen at half its size
 constexpr std::size_t kAtOnce = 16;  // key frames held at a time
