@@ -6,8 +6,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <opencv2/core.hpp>
 
 #include "cameras/row_poses.h"
+#include "recon/map.h"
 
 namespace rugae {
 namespace {
@@ -86,6 +88,32 @@ TEST(RollingShutter, WhatIsBehindIsNotSeen) {
   const RollingShutter shutter(barrel().pinhole(), barrel(), kRowTime_s);
   EXPECT_FALSE(shutter.project({0.0, 0.0, -5.0}, fast()).has_value());
   EXPECT_FALSE(shutter.project({0.0, 0.0, NAN}, fast()).has_value());
+}
+
+// A wall that comes nearer while the rows are read: each has the depth of its own time.
+TEST(RollingShutter, DepthIsThatOfThePixelsRow) {
+  const Lens lens = barrel();
+  const RollingShutter shutter(lens.pinhole(), lens, kRowTime_s);
+  TriangleMesh wall;
+  constexpr double kFar = 20.0, kSpeed = -100.0;
+  constexpr int kCells = 40;  // a triangle is flat only at one time
+  for (int y = 0; y <= kCells; ++y)
+    for (int x = 0; x <= kCells; ++x)
+      wall.vertices.emplace_back(80.0 * x / kCells - 40.0, 80.0 * y / kCells - 40.0, kFar);
+  for (int y = 0; y < kCells; ++y)
+    for (int x = 0; x < kCells; ++x) {
+      const int a = y * (kCells + 1) + x, b = a + kCells + 1;
+      wall.triangles.push_back({a, a + 1, b});
+      wall.triangles.push_back({b, a + 1, b + 1});
+    }
+  const CameraMotion nearer{Vec3::Zero(), Vec3(0.0, 0.0, kSpeed)};
+  const cv::Mat depth = keyframe_depth(wall, {Rigid3{}, nearer}, shutter, pixel_rays(lens));
+  constexpr double kBentMm = 0.02;  // between a triangle's corners
+  for (int y = 5; y < lens.height; y += 40) {
+    const double then = kFar + kSpeed * (y + 0.5 - 0.5 * lens.height) * kRowTime_s;
+    EXPECT_NEAR(depth.at<float>(y, 125), then, kBentMm) << y;
+  }
+  EXPECT_GE(std::abs(kSpeed * lens.height * kRowTime_s), 50.0 * kBentMm);
 }
 
 constexpr double kRounding = 1e-12;
