@@ -67,6 +67,20 @@ class MovingKeyframes : public testing::Test {
     return build_structure(world.frames, world.tracks, world.lens, BundleOptions{},
                            kFinalAdjustment, progress);
   }
+  /// Poses and points as they are, rays as they were seen.
+  static Structure truth() {
+    Structure s;
+    const synthetic::World own = synthetic::make_world(path(0.0));
+    s.frames = own.frames;
+    s.placed.assign(kCameras, true);
+    s.cam_from_world = own.cam_from_world;
+    s.tracks = own.tracks;
+    for (std::size_t t = 0; t < s.tracks.size(); ++t) {
+      s.tracks[t].point = own.points[t];
+      s.tracks[t].triangulated = true;
+    }
+    return s;
+  }
   static Structure linked(bool known) {
     Progress progress(Progress::Output::silent);
     Structure structure = chain_of(world(0.3));
@@ -131,24 +145,42 @@ TEST_F(MovingKeyframes, PathFramesAndWallOfPictures) {
     ASSERT_TRUE(pose.has_value());
     estimated.push_back(pose->inverse());
   }
-  EXPECT_LE(synthetic::path_error(estimated, recording_.world_from_camera).rmse, 0.5 * as_global);
+  const double between = synthetic::path_error(estimated, recording_.world_from_camera).rmse;
+  std::printf("frames between %.4f mm\n", between);
+  EXPECT_LE(between, 0.1 * as_global);  // 0.17 before the frames beside are known
+}
+
+// In its own anchor a patch is as it was cut out, rows read at other times and all; elsewhere what
+// is found agrees on where the key frame stands.
+TEST_F(MovingKeyframes, PatchesAreForetoldAndAgreed) {
+  Structure s = truth();
+  const FrameSource source = frames();
+  set_rays_at_frame_time(source, s);
+  const auto patches = make_patches(source, s);
+  ASSERT_GE(patches.size(), s.tracks.size() / 4);
+  const auto motions = keyframe_motions(source, s);
+  double worst = 0.0;
+  for (const WallPatch& patch : patches) {
+    const auto sight =
+        foretell(patch, {s.cam_from_world[patch.anchor], motions[patch.anchor]}, source.shutter());
+    ASSERT_TRUE(sight.has_value());
+    worst = std::max(worst, (sight->linear - Mat2::Identity()).norm());
+  }
+  // A slanted plane bends within the two pixels of the difference; rows taken for read at once are
+  // off by 0.36.
+  EXPECT_LE(worst, 0.05);
+
+  Progress progress(Progress::Output::silent);
+  const RevisitReport report = observe_again(source, patches, {}, {}, s, progress);
+  std::printf("worst %.4f, %zu found, %zu accepted\n", worst, report.found, report.accepted);
+  EXPECT_GE(report.found, 200u);
+  EXPECT_GE(static_cast<double>(report.accepted), 0.9 * static_cast<double>(report.found));
 }
 
 // At true poses: rows that are taken for read at once put the wall elsewhere.
 TEST_F(MovingKeyframes, TheWallIsWhereItIs) {
   const auto median_error_mm = [&](bool known) {
-    Structure s;
-    const synthetic::World exact = world(0.0);
-    s.frames = exact.frames;
-    s.placed.assign(kCameras, true);
-    s.cam_from_world = exact.cam_from_world;
-    s.tracks = exact.tracks;
-    const synthetic::World own = synthetic::make_world(path(0.0));
-    s.tracks.resize(own.tracks.size());
-    for (std::size_t t = 0; t < s.tracks.size(); ++t) {
-      s.tracks[t].point = own.points[t];
-      s.tracks[t].triangulated = true;
-    }
+    const Structure s = truth();
     DenseOptions options;
     options.width_px = 200;
     options.max_depth_maps = 6;
