@@ -9,7 +9,6 @@
 
 #include "core/srgb.h"
 #include "recon/dense/moving_keyframes.h"
-#include "recon/mask_at.h"
 #include "recon/masked_blur.h"
 #include "recon/preprocess/reflections.h"
 
@@ -45,15 +44,12 @@ cv::Mat light_of(const cv::Mat& bgr, const ReflectionOptions& reflections, const
 std::vector<LightSight> light_sights(const FrameSource& frames, const Structure& structure,
                                      const std::vector<WallPatch>& patches,
                                      const ReflectionOptions& reflections) {
-  struct Seen {
-    int patch, keyframe;
-  };
   const std::size_t n = structure.frames.size();
-  std::vector<std::vector<Seen>> seen(n);
+  std::vector<std::vector<std::size_t>> seen(n);  // patches, of each key frame
   for (std::size_t p = 0; p < patches.size(); ++p)
     for (const Track::Observation& o :
          structure.tracks[static_cast<std::size_t>(patches[p].track)].observations)
-      seen[static_cast<std::size_t>(o.keyframe)].push_back({static_cast<int>(p), o.keyframe});
+      seen[static_cast<std::size_t>(o.keyframe)].push_back(p);
   const RollingShutter& shutter = frames.shutter();
   const Lens& lens = shutter.original();
   const double half_diagonal_px = 0.5 * std::hypot(lens.width, lens.height);
@@ -65,8 +61,8 @@ std::vector<LightSight> light_sights(const FrameSource& frames, const Structure&
       const cv::Mat light =
           light_of(frames.observations().image(structure.frames[k]), reflections, frames.field());
       const Rigid3& pose = structure.cam_from_world[k];
-      for (const Seen& s : seen[k]) {
-        const WallPatch& patch = patches[static_cast<std::size_t>(s.patch)];
+      for (const std::size_t p : seen[k]) {
+        const WallPatch& patch = patches[p];
         const auto p_cam = shutter.when_seen(pose * patch.centre, motions[k]);
         const auto pixel = p_cam ? shutter.project_original(*p_cam) : std::nullopt;
         if (!pixel || !lens.contains(*pixel)) continue;
@@ -76,7 +72,7 @@ std::vector<LightSight> light_sights(const FrameSource& frames, const Structure&
         if (!(level > 0.0) || !(-normal_cam.dot(p_cam->normalized()) >= kMinCosine)) continue;
         const Vec2 off_axis = *pixel - Vec2(lens.cx, lens.cy);
         const Vec3 tangent = patch.normal.unitOrthogonal();
-        found[k].push_back({patch.track, s.keyframe, std::log(level), *p_cam, normal_cam,
+        found[k].push_back({patch.track, static_cast<int>(k), std::log(level), *p_cam, normal_cam,
                             pose.rotation * tangent, pose.rotation * patch.normal.cross(tangent),
                             patch.normal_sigma_rad, off_axis.norm() / half_diagonal_px});
       }

@@ -132,11 +132,7 @@ TEST_F(MovingKeyframes, PathFramesAndWallOfPictures) {
   std::printf("path error %.4f mm as if global, %.4f mm rolling\n", as_global, rolling);
   EXPECT_LE(rolling, 0.25 * as_global);
 
-  Structure half = s;
-  for (int k = 1; k + 1 < kCameras; k += 2) half.placed[k] = false;
-  for (Track& track : half.tracks)
-    std::erase_if(track.observations, [&](const auto& o) { return !half.placed[o.keyframe]; });
-  std::erase_if(half.tracks, [](const Track& track) { return track.observations.size() < 2; });
+  const Structure half = synthetic::every_other_keyframe(s);
   Progress progress(Progress::Output::silent);
   const FrameSource source = frames();
   const auto poses = place_frames(source, half, make_patches(source, half), {}, progress);

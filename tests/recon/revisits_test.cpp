@@ -165,11 +165,7 @@ TEST_F(Revisits, WrongSightsAreNotAccepted) {
 // between others.
 TEST_F(Revisits, FramesBetweenArePlacedInTheMap) {
   const Structure whole = linked();
-  Structure half = whole;
-  for (int k = 1; k + 1 < kCameras; k += 2) half.placed[k] = false;
-  for (Track& track : half.tracks)
-    std::erase_if(track.observations, [&](const auto& o) { return !half.placed[o.keyframe]; });
-  std::erase_if(half.tracks, [](const Track& track) { return track.observations.size() < 2; });
+  const Structure half = synthetic::every_other_keyframe(whole);
   Progress progress(Progress::Output::silent);
   const FrameSource source = frames();
   const auto poses = place_frames(source, half, make_patches(source, half), {}, progress);

@@ -217,6 +217,14 @@ Recording record(const std::filesystem::path& folder, const Lens& lens,
   return recording;
 }
 
+Structure every_other_keyframe(Structure half) {
+  for (std::size_t k = 1; k + 1 < half.placed.size(); k += 2) half.placed[k] = false;
+  for (Track& track : half.tracks)
+    std::erase_if(track.observations, [&](const auto& o) { return !half.placed[o.keyframe]; });
+  std::erase_if(half.tracks, [](const Track& track) { return track.observations.size() < 2; });
+  return half;
+}
+
 PathError path_error(const std::vector<Rigid3>& estimated, const std::vector<Rigid3>& truth) {
   std::vector<Vec3> source, target;
   Eigen::AlignedBox3d box;

@@ -71,6 +71,9 @@ Recording record(const std::filesystem::path& folder, const Lens& lens,
 Recording record(const std::filesystem::path& folder, const Lens& lens,
                  const std::vector<RowPoses>& world_from_camera, double noise_levels);
 
+/// Without every second key frame but the last, and what they alone saw.
+Structure every_other_keyframe(Structure half);
+
 /// Root mean square distance of estimated camera centres to the true ones after the best Sim(3),
 /// and the largest error of the turn from the first camera to another (a short path fixes the whole
 /// rotation badly); over placed cameras only.
