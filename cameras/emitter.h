@@ -1,6 +1,7 @@
 #pragma once
 // The lights beside a camera.
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,11 @@ struct Emitter {
   /// It lights exactly what the camera sees: no shadow of it is ever seen.
   bool central() const { return offset_mm.isZero(0.0); }
 };
+
+/// No light stands beside the camera.
+inline bool all_central(const std::vector<Emitter>& lights) {
+  return std::all_of(lights.begin(), lights.end(), [](const Emitter& l) { return l.central(); });
+}
 
 /// The list under the key "lights"; where there is none, one ideal emitter at the camera's centre.
 /// Throws Error with file, line and column: an empty list, an axis without direction, an intensity

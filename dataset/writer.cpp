@@ -194,8 +194,7 @@ void DatasetWriter::write_scene(const Camera& camera, const PoseTrack& track,
   write_same(layout_.trajectory(), tum_text(track));
   Calibration calibration{camera.lens, {}, {}};
   if (info_.truth.row_poses) calibration.row_time_us = camera.sensor.row_time_us;
-  if (std::ranges::any_of(camera.lights, [](const Emitter& light) { return !light.central(); }))
-    calibration.lights = camera.lights;
+  if (!all_central(camera.lights)) calibration.lights = camera.lights;
   write_same(layout_.calibration(), calibration_yaml(calibration, "calibration of " + camera.name));
   check(!fs::exists(layout_.wall()) || same_mesh(read_ply(layout_.wall()), wall),
         "{}: differs from this run's; choose another folder or remove it", layout_.wall().string());

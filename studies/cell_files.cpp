@@ -50,8 +50,7 @@ json dataset_key(const Variant& variant, const Cell& cell, const std::string& ca
   const Camera loaded = load_camera(camera);
   if (s.render.lens.rolling_shutter && loaded.sensor.shutter == Shutter::rolling)
     key["row_time"] = true;
-  if (std::ranges::any_of(loaded.lights, [](const Emitter& light) { return !light.central(); }))
-    key["lights"] = true;
+  if (!all_central(loaded.lights)) key["lights"] = true;
   return key;
 }
 

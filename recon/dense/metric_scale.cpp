@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "recon/dense/light_scale.h"
 
 namespace rugae {
@@ -11,7 +9,7 @@ namespace rugae {
 void scale_by_light(const FrameSource& frames, const ReflectionOptions& reflections,
                     Structure& structure, Progress& progress) {
   const std::vector<Emitter>& lights = frames.observations().lights();
-  if (std::ranges::all_of(lights, [](const Emitter& light) { return light.central(); })) return;
+  if (all_central(lights)) return;
   progress.begin("scale from light");
   const std::vector<WallPatch> patches = make_patches(frames, structure);
   const auto scale =
