@@ -93,7 +93,8 @@ bool dataset_finished(const fs::path& dataset) {
 }
 
 bool CellFiles::finished() const {
-  return fs::exists(metrics) && dataset_finished(dataset) && !tried_again(metrics);
+  return fs::exists(metrics) && (!frames_kept || dataset_finished(dataset)) &&
+         !tried_again(metrics);
 }
 
 CalibrationRun calibration_of(const Variant& variant, const Cell& cell, const CellFiles& files) {
@@ -107,6 +108,7 @@ CalibrationRun calibration_of(const Variant& variant, const Cell& cell, const Ce
 CellFiles files_of(const StudyOptions& study, const Cell& cell, const fs::path& out) {
   const Variant& variant = study.variants[static_cast<std::size_t>(cell.variant)];
   CellFiles files;
+  files.frames_kept = study.keep == Keep::all;
   files.camera = camera_of(variant, cell, out);
   const json data_key = dataset_key(variant, cell, files.camera);
   const std::string where = fmt::format("{}_{}", stem(cell.camera), stem(cell.trajectory));

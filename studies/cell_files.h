@@ -23,8 +23,10 @@ struct CellFiles {
   std::filesystem::path estimate;     // OUT/estimates/<camera>_<trajectory>_<method>_<hash>/
   std::filesystem::path metrics;      // OUT/metrics/<camera>_<trajectory>_<method>_<hash>.json
   std::filesystem::path scene;        // OUT/scenes/<hash>.yaml, of a scene that stands in the study
+  bool frames_kept = true;            // by the study, once the cell is measured
 
-  /// The metrics are there, and not those of a failure that is tried again.
+  /// The metrics are there, not those of a failure that is tried again, and the dataset where the
+  /// study keeps it.
   bool finished() const;
 };
 

@@ -11,6 +11,7 @@
 #include "core/presets.h"
 #include "dataset/image_io.h"
 #include "dataset/writer.h"
+#include "studies/discard.h"
 #include "studies/frame_pictures.h"
 #include "studies/html.h"
 #include "studies/map_over_truth.h"
@@ -48,24 +49,26 @@ std::string counted(std::size_t n, const std::string& one, const std::string& ma
   return fmt::format("{} {}", n, n == 1 ? one : many.empty() ? one + "s" : many);
 }
 
-std::string lede(const std::vector<StudyPart>& parts, const CellView& first) {
-  const Lens& lens = first.truth.camera().lens;
+// `first` is null where no cell's frames are kept, of several.
+std::string lede(const std::vector<StudyPart>& parts, const CellView* first) {
   const StudyOptions& study = parts.front().options;
   const SimulateOptions& simulate = study.variants.front().simulate;
   const std::string scene = html::escape(stem(simulate.scene));
   const std::size_t cells = all_cells(parts).size();
-  if (cells == 1)
+  if (cells == 1 && first) {
+    const Lens& lens = first->truth.camera().lens;
     return fmt::format(
         "{} frames of {} &times; {} px from a capsule camera (<b>{}</b>) on <b>trajectory {}</b>, "
         "{} cm through a simulated stomach (<b>{}</b>, {}, seed {}). The <b>{}</b> method "
         "reconstructed the path and the wall from the frames alone; here both are measured against "
         "the exact truth.",
-        first.truth.size(), lens.width, lens.height,
-        html::escape(published_camera(stem(first.cell.cell.camera))),
-        html::escape(stem(first.cell.cell.trajectory)),
-        html::number(length_mm(first.truth.track()) / 10.0, 4), scene,
-        html::escape(simulate.resolution), first.cell.cell.seed,
-        html::escape(first.cell.cell.method));
+        first->truth.size(), lens.width, lens.height,
+        html::escape(published_camera(stem(first->cell.cell.camera))),
+        html::escape(stem(first->cell.cell.trajectory)),
+        html::number(length_mm(first->truth.track()) / 10.0, 4), scene,
+        html::escape(simulate.resolution), first->cell.cell.seed,
+        html::escape(first->cell.cell.method));
+  }
   if (parts.size() > 1)
     return fmt::format(
         "{} cells in {} parts in a simulated stomach (<b>{}</b>, {}), each measured against the "
@@ -121,7 +124,7 @@ std::string overview_part(const std::vector<CellResult>& cells) {
   std::string sheet = "<div class=\"sheet\">";
   for (const CellResult& cell : cells) {
     const DatasetLayout layout{cell.dataset};
-    const int frame = read_info(layout.info()).frames / 3;
+    const int frame = frame_of_sheet(cell.dataset);
     sheet += fmt::format(
         "<a href=\"#{0}\"><img loading=\"lazy\" src=\"{1}\" alt=\"{0}, frame {2}\"><span>{3}, "
         "{4}</span></a>",
@@ -205,19 +208,27 @@ std::size_t detailed_cells(const std::vector<StudyPart>& parts) {
   return count;
 }
 
-// The head of the page: of the first cell, where there is one of the whole loop.
+// The head of the page: of the first cell whose frames are there, one of the whole loop if any is.
 void fill_head(const std::vector<StudyPart>& parts, std::map<std::string, std::string>& values) {
   std::vector<CellResult> cells = loop_cells(parts);
   const bool loop = !cells.empty();
   if (!loop) std::ranges::copy_if(all_cells(parts), std::back_inserter(cells), has_frames);
   check(!cells.empty(), "report: no cell of the study has frames; the first failed: {}",
         all_cells(parts)[0].metrics.value("failed", "without a reason"));
-  const Truth truth = Truth::open(cells[0].dataset);
-  const Estimate estimate = estimate_of(cells[0]);
   const bool many = cells.size() > 1;
-  const CellView view{cells[0], truth, estimate, many};
-  values["cover"] = cover_picture(view);
-  values["lede"] = lede(parts, view);
+  const auto first = std::ranges::find_if(
+      cells, [](const CellResult& cell) { return dataset_finished(cell.dataset); });
+  if (first == cells.end()) {  // the study keeps none
+    values["cover"] = values["cards"] = "";
+    values["lede"] = lede(parts, nullptr);
+    return;
+  }
+  const Truth truth = Truth::open(first->dataset);
+  const Estimate estimate = estimate_of(*first);
+  const CellView view{*first, truth, estimate, many};
+  values["cover"] = "<img class=\"zoom\" src=\"" + cover_picture(view) +
+                    "\" alt=\"a frame from inside the stomach\">";
+  values["lede"] = lede(parts, &view);
   values["cards"] = loop && !many ? headline_cards(view) : "";
 }
 

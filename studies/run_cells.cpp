@@ -15,6 +15,7 @@
 #include "cameras/camera.h"
 #include "core/check.h"
 #include "core/files.h"
+#include "studies/discard.h"
 #include "studies/make_cell.h"
 #include "studies/process.h"
 
@@ -101,8 +102,10 @@ class TimeLeft {
 
 class Workers {
  public:
-  Workers(const fs::path& study, const fs::path& out, const RunOptions& options, Progress& progress)
-      : study_(study), out_(out), options_(options), progress_(progress) {
+  // `all` cells of the study, finished ones as well.
+  Workers(const std::vector<CellJob>& all, const fs::path& study, const fs::path& out,
+          const RunOptions& options, Progress& progress)
+      : all_(all), study_(study), out_(out), options_(options), progress_(progress) {
     if (options_.memory_gb <= 0.0) options_.memory_gb = kFreeShare * free_memory_gb();
   }
 
@@ -119,6 +122,7 @@ class Workers {
           continue;
         }
         finish(*at);
+        discard_finished(all_);
         time_left.done(*at->job);
         progress_.step();
         progress_.say(
@@ -210,6 +214,7 @@ class Workers {
         true);
   }
 
+  const std::vector<CellJob>& all_;
   fs::path study_, out_;
   RunOptions options_;
   Progress& progress_;
@@ -233,15 +238,19 @@ double memory_gb_of(const CellJob& job) {
 void run_cells(const std::vector<CellJob>& jobs, const fs::path& study_file, const fs::path& out,
                const RunOptions& options, Progress& progress) {
   options.check();
+  discard_finished(jobs);  // what a killed run left
   std::vector<CellJob> waiting;
   for (const CellJob& job : jobs)
     if (!job.files.finished()) waiting.push_back(job);
   if (options.jobs > 1 && waiting.size() > 1 && !options.program.empty()) {
-    Workers(study_file, out, options, progress).run(std::move(waiting));
+    Workers(jobs, study_file, out, options, progress).run(std::move(waiting));
     return;
   }
-  for (const CellJob& job : waiting)
-    if (!job.files.finished()) make_cell(*job.study, job.cell, job.files, progress);
+  for (const CellJob& job : waiting) {
+    if (job.files.finished()) continue;  // another cell of this run was the same
+    make_cell(*job.study, job.cell, job.files, progress);
+    discard_finished(jobs);
+  }
 }
 
 }  // namespace rugae

@@ -101,6 +101,16 @@ std::vector<ExternalMethod> read_commands(YamlReader& study, const std::string& 
   return commands;
 }
 
+void read_keep(YamlReader& yaml, StudyOptions& study) {
+  int keep = 0;
+  yaml.get_choice("keep", keep_names(), keep);
+  study.keep = static_cast<Keep>(keep);
+  const bool shown = study.details && study.measure == Measure::loop;
+  check(study.keep == Keep::all || !shown,
+        "{}: keep is results, expected details: false beside it: a cell's details show its frames",
+        yaml.where("keep"));
+}
+
 void read_measure(YamlReader& yaml, StudyOptions& study) {
   int measure = 0;
   yaml.get_choice("measure", measure_names(), measure);
@@ -164,6 +174,11 @@ const std::vector<std::string>& measure_names() {
   return kNames;
 }
 
+const std::vector<std::string>& keep_names() {
+  static const std::vector<std::string> kNames = {"all", "results"};
+  return kNames;
+}
+
 const ExternalMethod* StudyOptions::command_of(const std::string& method) const {
   const auto at = std::ranges::find(commands, method, &ExternalMethod::name);
   return at == commands.end() ? nullptr : &*at;
@@ -180,6 +195,7 @@ StudyOptions read_part_text(const std::string& text, const std::string& name) {
   read_names(yaml, "trajectories", "trajectory", study.trajectories);
   read_seeds(yaml, study.seeds);
   read_measure(yaml, study);
+  read_keep(yaml, study);
   study.commands = read_commands(yaml, name);
   read_methods(yaml, base.recon, study);
   const std::vector<Axis> axes = read_axes(yaml);

@@ -25,6 +25,10 @@ struct Gate {
 enum class Measure { loop, features, reflections, vignetting };
 const std::vector<std::string>& measure_names();
 
+/// What stays of a cell that is measured: all of it, or its metrics and one frame.
+enum class Keep { all, results };
+const std::vector<std::string>& keep_names();
+
 /// Which pairs of frames features are measured on.
 struct FeaturePairs {
   int step = 1;    // pairs (i, i + step)
@@ -45,7 +49,8 @@ struct StudyOptions {
   Measure measure = Measure::loop;  // of features the methods are feature methods
   FeaturePairs features;
   bool details = true;  // of each cell in the report, not its row in the tables alone; of the loop
-  std::string text;     // as it was read
+  Keep keep = Keep::all;
+  std::string text;  // as it was read
 
   /// Null for a method of ours.
   const ExternalMethod* command_of(const std::string& method) const;

@@ -48,6 +48,19 @@ TEST(StudyFile, AnUnknownKeyIsNamedWithLineAndColumn) {
             "study.yaml:3:1: unknown key 'frame'; did you mean 'frames'?");
 }
 
+TEST(StudyFile, CellsShownInFullKeepTheirFrames) {
+  EXPECT_EQ(read_part_text(kHead, "study.yaml").keep, Keep::all);
+  EXPECT_EQ(read_part_text(kHead + "details: false\nkeep: results\n", "study.yaml").keep,
+            Keep::results);
+  EXPECT_EQ(read_part_text(kHead + "measure: vignetting\nkeep: results\n", "study.yaml").keep,
+            Keep::results);  // single stages have no details
+  EXPECT_EQ(error_of(kHead + "keep: results\n"),
+            "study.yaml:3:7: keep is results, expected details: false beside it: a cell's details "
+            "show its frames");
+  EXPECT_EQ(error_of(kHead + "keep: nothing\n"),
+            "study.yaml:3:7: keep is 'nothing', expected one of: all, results");
+}
+
 TEST(StudyFile, AMissingOrUnknownPresetIsNamed) {
   EXPECT_EQ(error_of("trajectories: [\"1\"]\n"), "study.yaml:1:1: key 'cameras' is missing");
   const std::string error = error_of("cameras: [misumi-v550]\ntrajectories: [\"1\"]\n");

@@ -153,5 +153,57 @@ TEST_F(RunStudy, CellsShareWhatIsTheSame) {
   EXPECT_EQ(files_in("estimates"), 6);
 }
 
+// The numbers are those of a study that keeps everything, and so they stay when it runs again, for
+// less, for more, or after it was killed while it cleared up.
+TEST_F(RunStudy, KeepsNoMoreThanItIsAskedTo) {
+  const std::string axes = "details: false\nseeds: [1, 2, 3]\n";
+  run(write_study(axes));
+  const auto cells = [&] {
+    return json::parse(read_text(folder_ / "out" / "results.json")).at("cells");
+  };
+  const json expected = cells();
+  const auto dataset = [&](std::size_t cell) {
+    return folder_ / "out" / "datasets" / expected.at(cell).at("dataset");
+  };
+  const std::string manifest = read_text(dataset(1) / "manifest.sha256");
+
+  const fs::path file = write_study(axes + "keep: results\n");
+  const StudyResult result = run(file);
+  EXPECT_EQ(cells(), expected);
+  EXPECT_TRUE(fs::exists(dataset(0) / "manifest.sha256"));  // shown at the head of the page
+  EXPECT_EQ(files_in("motions"), 1);
+  EXPECT_EQ(files_in("estimates"), 1);
+  for (const std::size_t cell : {1, 2}) {
+    std::vector<std::string> left;
+    for (const auto& entry : fs::recursive_directory_iterator(dataset(cell)))
+      if (!entry.is_directory()) left.push_back(entry.path().filename());
+    std::ranges::sort(left);
+    EXPECT_EQ(left, (std::vector<std::string>{"000004.png", "dataset.json"}));
+  }
+  const std::string page = read_text(result.report);
+  EXPECT_NE(page.find("a frame from inside the stomach"), std::string::npos);
+  EXPECT_NE(page.find("paper_seed3, frame 4"), std::string::npos);  // its frame among all cells
+
+  const std::string before = unchanging();
+  run(file);
+  EXPECT_EQ(unchanging(), before);
+
+  // A first cell that failed has no frames to show, and the others' are gone.
+  const std::string measured =
+      (folder_ / "out" / "metrics" / (expected.at(0).at("estimate").get<std::string>() + ".json"))
+          .string();
+  const std::string metrics = read_text(measured);
+  json failure = json::parse(metrics);
+  failure["failed"] = "as if";
+  write_atomic(measured, failure.dump());
+  EXPECT_EQ(read_text(run(file).report).find("a frame from inside"), std::string::npos);
+  EXPECT_FALSE(fs::exists(dataset(0) / "manifest.sha256"));
+  write_atomic(measured, metrics);
+
+  // What is asked of the same frames later renders them again, all of them, to the same bytes.
+  run(write_study(axes + "recon: {shading: {iterations: 5}}\n"));
+  EXPECT_EQ(read_text(dataset(1) / "manifest.sha256"), manifest);
+}
+
 }  // namespace
 }  // namespace rugae
