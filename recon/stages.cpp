@@ -3,8 +3,8 @@
 #include <utility>
 
 #include "recon/dense/frame_poses.h"
+#include "recon/dense/linked_structure.h"
 #include "recon/dense/metric_scale.h"
-#include "recon/dense/revisits.h"
 #include "recon/resection.h"
 
 namespace rugae {
@@ -18,13 +18,12 @@ Stages::Stages()
       }),
       structure([](const FrameSource& frames, const std::vector<int>& keyframes,
                    std::vector<Track> tracks, const ReconOptions& options, Progress& progress) {
-        const bool linked = options.method == "dense" && options.revisits.rounds > 0;
-        Structure found =
-            build_structure(keyframes, std::move(tracks), frames.lens(), options.bundle,
-                            linked ? kDraftAdjustment : kFinalAdjustment, progress);
-        if (linked) link_revisits(frames, options.revisits, options.bundle, found, progress);
-        if (options.method == "dense")
-          scale_by_light(frames, options.preprocess.reflections, found, progress);
+        if (options.method != "dense")
+          return build_structure(keyframes, std::move(tracks), frames.lens(), options.bundle,
+                                 kFinalAdjustment, progress);
+        Structure found = build_linked_structure(frames, keyframes, std::move(tracks),
+                                                 options.revisits, options.bundle, progress);
+        scale_by_light(frames, options.preprocess.reflections, found, progress);
         return found;
       }),
       resect([](const FrameSource& frames, const Structure& structure, const ReconOptions& options,

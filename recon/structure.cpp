@@ -117,24 +117,38 @@ std::vector<Segment> grow_all(Structure& s, double focal_px, const BundleOptions
   return segments;
 }
 
-// Joins what can be joined to the largest segment and returns it.
-Segment joined(std::vector<Segment> segments) {
+// Joins what can be joined to the largest segment, which comes first.
+void join_to_largest(std::vector<Segment>& segments) {
   std::stable_sort(segments.begin(), segments.end(),
                    [](const Segment& a, const Segment& b) { return a.count > b.count; });
-  Segment whole = std::move(segments.front());
-  segments.erase(segments.begin());
   for (bool changed = true; changed;) {
     changed = false;
-    for (std::size_t i = 0; i < segments.size(); ++i) {
-      const auto whole_from_other = join(whole, segments[i]);
+    for (std::size_t i = 1; i < segments.size(); ++i) {
+      const auto whole_from_other = join(segments[0], segments[i]);
       if (!whole_from_other) continue;
-      merge(whole, segments[i], *whole_from_other);
+      merge(segments[0], segments[i], *whole_from_other);
       segments.erase(segments.begin() + static_cast<std::ptrdiff_t>(i));
       changed = true;
       break;
     }
   }
-  return whole;
+}
+
+// Of `all` that one segment placed, with what its key frames see.
+Structure structure_of(const Segment& segment, const Structure& all) {
+  Structure s;
+  s.frames = all.frames;
+  s.placed = segment.placed;
+  s.cam_from_world = segment.cam_from_world;
+  for (std::size_t t = 0; t < all.tracks.size(); ++t) {
+    Track track = all.tracks[t];
+    std::erase_if(track.observations, [&](const auto& o) { return !segment.placed[o.keyframe]; });
+    if (track.observations.size() < 2) continue;
+    track.point = segment.points[t];
+    track.triangulated = segment.has_point[t] != 0;
+    s.tracks.push_back(std::move(track));
+  }
+  return s;
 }
 
 }  // namespace
@@ -197,34 +211,37 @@ void finish_structure(Structure& s, const Lens& lens, const BundleOptions& optio
   progress.end(fmt::format("{} points, {:.3f} px", s.tracks.size(), s.mean_reprojection_px));
 }
 
-Structure build_structure(const std::vector<int>& frames, std::vector<Track> tracks,
-                          const Lens& lens, const BundleOptions& options,
-                          const Adjustment& adjustment, Progress& progress) {
-  const double focal_px = lens.fx;
+std::vector<Structure> build_segments(const std::vector<int>& frames, std::vector<Track> tracks,
+                                      const Lens& lens, const BundleOptions& options,
+                                      Progress& progress) {
   const std::size_t n = frames.size();
   Structure s;
   s.frames = frames;
   s.tracks = std::move(tracks);
   progress.begin("structure", n);
-  std::vector<Segment> segments = grow_all(s, focal_px, options, progress);
-  const std::size_t segment_count = segments.size();
-  s.placed.assign(n, false);
-  s.cam_from_world.assign(n, Rigid3{});
-  for (Track& track : s.tracks) track.triangulated = false;
+  std::vector<Segment> segments = grow_all(s, lens.fx, options, progress);
+  const std::size_t grown = segments.size();
   if (segments.empty()) {
+    s.placed.assign(n, false);
+    s.cam_from_world.assign(n, Rigid3{});
     s.tracks.clear();
     progress.end("nothing could be placed");
-    return s;
+    return {std::move(s)};
   }
-  const Segment whole = joined(std::move(segments));
-  s.placed = whole.placed;
-  s.cam_from_world = whole.cam_from_world;
-  for (std::size_t t = 0; t < s.tracks.size(); ++t) {
-    s.tracks[t].point = whole.points[t];
-    s.tracks[t].triangulated = whole.has_point[t] != 0;
-  }
-  progress.end(fmt::format("{} of {} key frames, {} segments", s.placed_count(), n, segment_count));
-  finish_structure(s, lens, options, adjustment, progress);
+  join_to_largest(segments);
+  std::vector<Structure> structures;
+  for (const Segment& segment : segments) structures.push_back(structure_of(segment, s));
+  progress.end(
+      fmt::format("{} of {} key frames, {} segments", structures[0].placed_count(), n, grown));
+  return structures;
+}
+
+Structure build_structure(const std::vector<int>& frames, std::vector<Track> tracks,
+                          const Lens& lens, const BundleOptions& options,
+                          const Adjustment& adjustment, Progress& progress) {
+  Structure s =
+      std::move(build_segments(frames, std::move(tracks), lens, options, progress).front());
+  if (s.placed_count() > 0) finish_structure(s, lens, options, adjustment, progress);
   return s;
 }
 

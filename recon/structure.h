@@ -58,11 +58,16 @@ inline constexpr Adjustment kDraftAdjustment{1, 1e-5};
 /// Rays of all observations from their pixels; an observation the lens has no ray for is removed.
 void set_rays(std::vector<Track>& tracks, const Lens& lens);
 
-/// Places the key frames one after another from the best pair on and adjusts all of them jointly.
-/// `frames` are the key frames' indices, `lens` that of the preprocessed frames. Where the chain
-/// breaks a new segment begins; segments that share enough points are joined, and of those that
-/// cannot be joined the largest is returned: key frames of the others are not placed. Throws
-/// nothing for hopeless input: then no key frame is placed.
+/// Places the key frames one after another from the best pair on. `frames` are the key frames'
+/// indices, `lens` that of the preprocessed frames. Where the chain breaks a new segment begins;
+/// segments that share enough points are joined to the largest. Each that is left has a structure
+/// of its own, with the tracks that its key frames see, in the order of their size, not yet
+/// finished. Throws nothing for hopeless input: then there is one, and no key frame is placed.
+std::vector<Structure> build_segments(const std::vector<int>& frames, std::vector<Track> tracks,
+                                      const Lens& lens, const BundleOptions& options,
+                                      Progress& progress);
+
+/// The largest segment, all of it adjusted jointly: key frames of the others are not placed.
 Structure build_structure(const std::vector<int>& frames, std::vector<Track> tracks,
                           const Lens& lens, const BundleOptions& options,
                           const Adjustment& adjustment, Progress& progress);

@@ -6,15 +6,12 @@
 #include <algorithm>
 
 #include "recon/dense/moving_keyframes.h"
-#include "recon/dense/register_patch.h"
+#include "recon/dense/place_by_patches.h"
 #include "recon/frames_between.h"
-#include "recon/resection.h"
-#include "recon/tracks.h"
 
 namespace rugae {
 namespace {
 
-constexpr double kReferenceWidthPx = 640.0;
 constexpr double kSearchPx = 16.0;         // around where a patch should be, at 640 px width
 constexpr std::size_t kMostPatches = 300;  // looked for: more adds time and no precision
 constexpr int kFramesAtOnce = 16;          // between two steps of the progress line
@@ -33,27 +30,6 @@ std::vector<const WallPatch*> seen_by(const std::vector<int>& keyframes,
   for (std::size_t i = 0; i < indices.size(); i += stride)
     chosen.push_back(&patches[static_cast<std::size_t>(indices[i])]);
   return chosen;
-}
-
-std::optional<Rigid3> place(const std::vector<const WallPatch*>& patches, const PatchImage& image,
-                            const MovingPose& guess, const PatchRegistrar& registrar,
-                            const RollingShutter& shutter, const BundleOptions& options) {
-  const Lens& lens = shutter.lens();
-  const double reach_px = kSearchPx * lens.width / kReferenceWidthPx;
-  std::vector<Vec3> points;
-  std::vector<Vec2> rays;
-  for (const WallPatch* patch : patches) {
-    const auto sight = foretell(*patch, guess, shutter);
-    if (!sight) continue;
-    const auto pixel = registrar.find(*patch, *sight, image, reach_px);
-    const auto ray = pixel ? ray_of(lens, *pixel) : std::nullopt;
-    if (!ray) continue;
-    const double depth = (guess.cam_from_world * patch->centre).z();
-    points.push_back(patch->centre);
-    rays.push_back(shutter.ray_at_frame_time(*ray, depth, guess.motion));
-  }
-  const auto placed = place_by_points(points, rays, lens.fx, options);
-  return placed ? std::optional(placed->cam_from_world) : std::nullopt;
 }
 
 }  // namespace
@@ -90,9 +66,10 @@ std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
         const Between around = between(structure, placed, f);
         const auto seen = seen_by(around.keyframes, patches_of, patches);
         for (const MovingPose& guess : guesses_of(f, around)) {
-          const auto pose = place(seen, image, guess, registrar, shutter, options);
-          if (!pose) continue;
-          poses[f] = pose;
+          const auto placed =
+              place_by_patches(seen, image, guess, registrar, shutter, kSearchPx, options);
+          if (!placed) continue;
+          poses[f] = placed->cam_from_world;
           break;
         }
       });

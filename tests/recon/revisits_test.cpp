@@ -12,6 +12,7 @@
 
 #include "core/files.h"
 #include "recon/dense/frame_poses.h"
+#include "recon/dense/rejoin.h"
 #include "synthetic.h"
 
 namespace rugae {
@@ -23,6 +24,10 @@ namespace fs = std::filesystem;
 // Of the path's size, what one more adjustment may move a camera: a drafted one leaves three times
 // as much.
 constexpr double kEndShare = 2e-6;
+// Where a world lies changes no more than rounding does to what is found to a tenth of a pixel.
+constexpr double kMovedShare = 1e-4;
+// Of the path's extent, a segment placed by a few dozen patches a key frame, before it is linked.
+constexpr double kJoinedShare = 0.02;
 
 class Revisits : public testing::Test {
  protected:
@@ -68,6 +73,25 @@ class Revisits : public testing::Test {
     Structure structure = chain_;
     link_revisits(frames(), RevisitOptions{}, BundleOptions{}, structure, progress);
     return structure;
+  }
+
+  // Two segments: no track leads across from key frames before `end` to those from `begin` on, and
+  // none to what lies between.
+  static std::vector<Structure> broken(int end, int begin) {
+    std::vector<Track> tracks;
+    for (const Track& track : world_.tracks)
+      for (const bool behind : {false, true}) {
+        Track part = track;
+        std::erase_if(part.observations, [&](const Track::Observation& o) {
+          return behind ? o.keyframe < begin : o.keyframe >= end;
+        });
+        if (part.observations.size() >= 2) tracks.push_back(std::move(part));
+      }
+    Progress progress(Progress::Output::silent);
+    auto segments = build_segments(world_.frames, tracks, world_.lens, BundleOptions{}, progress);
+    for (Structure& segment : segments)
+      finish_structure(segment, world_.lens, BundleOptions{}, kFinalAdjustment, progress);
+    return segments;
   }
 
   static fs::path root_;
@@ -178,6 +202,57 @@ TEST_F(Revisits, FramesBetweenArePlacedInTheMap) {
   // Patches of 12 px found to a tenth of one, by the dozen: as good as the key frames themselves.
   const double error = synthetic::path_error(estimated, truth).rmse;
   EXPECT_TRUE(error <= 2.0 * synthetic::path_error(whole, world_).rmse) << error;
+}
+
+// The chain broke on the way back, where the camera turned around unseen, which no motion
+// foretells, and on the way there over three lost frames, which nothing but the motion bridges:
+// both segments are one map afterwards, as good as if it had not.
+TEST_F(Revisits, SegmentsFindTheirPlaceInTheMap) {
+  for (const auto& [end, begin] :
+       {std::pair(12, 12), std::pair(kThere, kThere + 1), std::pair(4, 7)}) {
+    std::vector<Structure> segments = broken(end, begin);
+    ASSERT_EQ(segments.size(), 2u) << begin;
+    Structure map = segments[0], segment = segments[1];
+    const auto found = map_from_segment(frames(), map, make_patches(frames(), map), segment,
+                                        RevisitOptions{}, BundleOptions{});
+    ASSERT_TRUE(found) << begin;
+
+    // The segment's own world, wherever it is, does not matter.
+    const Sim3 moved{7.0, Quat(Eigen::AngleAxisd(1.1, Vec3(1, 2, 3).normalized())), Vec3(4, 5, 6)};
+    for (Rigid3& pose : segment.cam_from_world) pose = (moved * pose.inverse()).inverse();
+    for (Track& track : segment.tracks) track.point = moved * track.point;
+    const auto again = map_from_segment(frames(), map, make_patches(frames(), map), segment,
+                                        RevisitOptions{}, BundleOptions{});
+    ASSERT_TRUE(again) << begin;
+    EXPECT_NEAR(again->scale * moved.scale / found->scale, 1.0, kMovedShare);
+    EXPECT_LT(angle_between_rad((*again * moved).rotation, found->rotation), kMovedShare);
+
+    Progress progress(Progress::Output::silent);
+    ASSERT_EQ(rejoin(frames(), {segment}, RevisitOptions{}, BundleOptions{}, map, progress), 1);
+    EXPECT_EQ(map.placed_count(), kCameras - (begin - end));
+    const double before = synthetic::path_error(map, world_).rmse;
+    link_revisits(frames(), RevisitOptions{}, BundleOptions{}, map, progress);
+    EXPECT_EQ(map.placed_count(), kCameras - (begin - end));
+    const double after = synthetic::path_error(map, world_).rmse;
+    const double whole = synthetic::path_error(linked(), world_).rmse;
+    std::printf("path error %.4f mm joined, %.4f mm linked, %.4f mm unbroken\n", before, after,
+                whole);
+    EXPECT_TRUE(before <= kJoinedShare * synthetic::path_error(map, world_).path_extent) << before;
+    EXPECT_TRUE(after <= 2.0 * whole) << after;
+  }
+}
+
+// Pictures of other wall than the map's: the segment stays out of it.
+TEST_F(Revisits, SegmentsOfOtherWallStayOut) {
+  std::vector<Structure> segments = broken(5, 13);
+  ASSERT_EQ(segments.size(), 2u);
+  Structure& map = segments[segments[0].placed[0] ? 0 : 1];
+  Structure& segment = segments[segments[0].placed[0] ? 1 : 0];
+  const auto patches = make_patches(frames(), map);
+  EXPECT_TRUE(map_from_segment(frames(), map, patches, segment, RevisitOptions{}, BundleOptions{}));
+  for (int k = 13; k < kCameras; ++k) segment.frames[k] = kThere - 1 + k % 2;  // the far end
+  EXPECT_FALSE(
+      map_from_segment(frames(), map, patches, segment, RevisitOptions{}, BundleOptions{}));
 }
 
 TEST_F(Revisits, TheNumberOfThreadsChangesNothing) {
