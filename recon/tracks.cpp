@@ -7,8 +7,8 @@
 #include <cmath>
 #include <map>
 #include <opencv2/imgproc.hpp>
-#include <unordered_map>
 
+#include "core/check.h"
 #include "core/random.h"
 #include "recon/flow_guess.h"
 #include "recon/look_back.h"
@@ -25,36 +25,6 @@ constexpr double kMinFollowedShare = 0.5;
 constexpr int kBorder = 8;                // px: no corner nearer to where the image ends
 constexpr int kMoreRounds = 2;            // of following again, where few points were found
 constexpr std::size_t kLookedBackAt = 3;  // earlier key frames, where the chain broke
-
-// Occupied cells of side `spacing`: a point is taken when another lies within `spacing` of it.
-class Occupied {
- public:
-  explicit Occupied(double spacing) : spacing_(spacing) {}
-  bool taken(const Vec2& p) const {
-    const auto [cx, cy] = cell(p);
-    for (int y = cy - 1; y <= cy + 1; ++y)
-      for (int x = cx - 1; x <= cx + 1; ++x) {
-        const auto found = cells_.find(key(x, y));
-        if (found == cells_.end()) continue;
-        for (const Vec2& q : found->second)
-          if ((q - p).norm() < spacing_) return true;
-      }
-    return false;
-  }
-  void add(const Vec2& p) {
-    const auto [cx, cy] = cell(p);
-    cells_[key(cx, cy)].push_back(p);
-  }
-
- private:
-  std::pair<int, int> cell(const Vec2& p) const {
-    return {static_cast<int>(std::floor(p.x() / spacing_)),
-            static_cast<int>(std::floor(p.y() / spacing_))};
-  }
-  static std::int64_t key(int x, int y) { return (static_cast<std::int64_t>(y) << 32) + x; }
-  double spacing_;
-  std::unordered_map<std::int64_t, std::vector<Vec2>> cells_;
-};
 
 // A frame with its corners, as far as both are known ahead of their turn.
 struct Prepared {
@@ -110,80 +80,47 @@ void set_rays(std::vector<Track>& tracks, const Lens& lens) {
   }
 }
 
-std::vector<Vec2> TrackChain::starts(int frame, const std::vector<Vec2>& fresh, double spacing_px) {
-  std::vector<int>& through = through_[frame];
-  Occupied occupied(spacing_px);
-  std::vector<Vec2> points;
-  for (const int t : through) {
-    points.push_back(tracks_[t].observations.back().pixel);
-    for (const auto& o : tracks_[t].observations)
-      if (o.keyframe == frame) points.back() = o.pixel;
-    occupied.add(points.back());
-  }
-  for (const Vec2& p : fresh) {
-    if (occupied.taken(p)) continue;
-    occupied.add(p);
-    Track track;
-    track.observations.push_back({frame, p});
-    through.push_back(static_cast<int>(tracks_.size()));
-    tracks_.push_back(std::move(track));
-    points.push_back(p);
-  }
-  started_ = through;
-  return points;
-}
-
-void TrackChain::add(int moving, const std::vector<int>& point_index,
-                     const std::vector<Vec2>& moving_px, double spacing_px) {
-  // Two tracks that ran together are one point seen twice: the second is not continued.
-  Occupied occupied(0.25 * spacing_px);
-  for (const int t : through_[moving])
-    for (const auto& o : tracks_[t].observations)
-      if (o.keyframe == moving) occupied.add(o.pixel);
-  for (std::size_t i = 0; i < point_index.size(); ++i) {
-    const int t = started_[point_index[i]];
-    Track& track = tracks_[t];
-    const bool known = std::any_of(track.observations.begin(), track.observations.end(),
-                                   [&](const auto& o) { return o.keyframe == moving; });
-    if (known || occupied.taken(moving_px[i])) continue;
-    occupied.add(moving_px[i]);
-    track.observations.push_back({moving, moving_px[i]});
-    through_[moving].push_back(t);
-  }
-}
-
-std::vector<Track> TrackChain::finish() {
-  std::erase_if(tracks_, [](const Track& t) { return t.observations.size() < 2; });
-  for (Track& track : tracks_)
-    std::sort(track.observations.begin(), track.observations.end(),
-              [](const auto& a, const auto& b) { return a.keyframe < b.keyframe; });
-  return std::move(tracks_);
-}
-
-Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
-                       const AlignOptions& align_options, const TrackOptions& options,
-                       std::uint64_t seed, Progress& progress) {
-  const double spacing_px = options.spacing_px * frames.lens().width / kReferenceWidth;
-  progress.begin("pairwise alignment", keyframes.frames.size());
-  Followed followed;
-  std::vector<int>& at = followed.keyframes;
-  at = keyframes.frames;
-  const AlignField field = prepare_field(frames.valid(), align_options);
+struct TrackFollower::Impl {
+  const FrameSource& frames;
+  AlignOptions align_options;
+  std::uint64_t seed;
+  double spacing_px;
+  AlignField field;
+  std::vector<int> at;               // key frames, as selected and between; the first `k` are done
+  std::size_t k = 0;                 // the next to follow from
   std::map<int, Prepared> prepared;  // from the reference on
-  const auto prepare = [&](int index) -> Prepared {
+  TrackChain chain;
+  LookBack memory;
+  std::optional<PairAlignment> previous;  // k - 1 to k
+  // The flow between the next two key frames, measured while this one's neighbours are aligned.
+  struct {
+    int reference = -1, moving = -1;
+    PairFlow flow;
+  } ahead;
+  std::vector<PairAlignment> pairs;
+  int failed = 0, bridges = 0, between = 0;
+
+  Impl(const FrameSource& source, const AlignOptions& align, const TrackOptions& options,
+       std::uint64_t of_run)
+      : frames(source),
+        align_options(align),
+        seed(of_run),
+        spacing_px(options.spacing_px * source.lens().width / kReferenceWidth),
+        field(prepare_field(source.valid(), align)),
+        memory(source.valid()) {}
+
+  Prepared prepare(int index) const {
     const Frame frame = frames.pose_frame(index);
     return {prepare_alignment(frame, field), corners(frame, spacing_px)};
-  };
-  const auto load = [&](int index) -> const Prepared& {
+  }
+  const Prepared& load(int index) {
     const auto [place, fresh] = prepared.try_emplace(index);
     if (fresh) place->second = prepare(index);
     return place->second;
-  };
-  TrackChain chain;
-  LookBack memory(frames.valid());
+  }
+
   // Where the chain broke before this key frame: the points of an earlier one go on.
-  int bridges = 0;
-  const auto look_back = [&](const AlignImage& image) {
+  void look_back(const AlignImage& image) {
     memory.add(image.index, image.gray);
     for (const LookBack::Candidate& earlier : memory.candidates(image.index, kLookedBackAt)) {
       const AlignGuess known{chain.starts(earlier.frame, {}, spacing_px), earlier.flow, false, {}};
@@ -195,62 +132,68 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
       ++bridges;
       return;
     }
-  };
-  std::optional<PairAlignment> previous;  // k - 1 to k
-  // The flow between the next two key frames, measured while this one's neighbours are aligned.
-  struct {
-    int reference = -1, moving = -1;
-    PairFlow flow;
-  } ahead;
-  int failed = 0;
-  for (std::size_t k = 0; k < at.size(); ++k) {
+  }
+
+  std::optional<PairAlignment> follow(const AlignImage& reference, const AlignImage& moving,
+                                      const std::vector<Vec2>& points, const cv::Mat& guess,
+                                      bool affine) const {
+    AlignGuess known{points, guess, affine, {}};
+    if (guess.empty() && ahead.reference == reference.index && ahead.moving == moving.index)
+      known.measured = ahead.flow;
+    return align(reference, moving, align_options, pair_seed(seed, reference.index, moving.index),
+                 known);
+  }
+  // To the next key frame: whatever the motion, or else as it was before.
+  std::optional<PairAlignment> follow_next(const AlignImage& reference, const AlignImage& next,
+                                           const std::vector<Vec2>& points) const {
+    auto found = follow(reference, next, points, {}, true);
+    if (!found && previous)
+      found = follow(reference, next, points,
+                     continued(*previous, next.index, reference.gray.size()), true);
+    return found;
+  }
+
+  // From key frame k to the next, and where that one comes too late to one between.
+  std::optional<PairAlignment> to_the_next(const std::vector<Vec2>& points) {
     const AlignImage& reference = load(at[k]).image;
-    look_back(reference);
     const cv::Size size = reference.gray.size();
-    const std::vector<Vec2> points = chain.starts(at[k], load(at[k]).corners, spacing_px);
-    const auto follow = [&](const AlignImage& moving, const cv::Mat& guess, bool affine) {
-      AlignGuess known{points, guess, affine, {}};
-      if (guess.empty() && ahead.reference == reference.index && ahead.moving == moving.index)
-        known.measured = ahead.flow;
-      return align(reference, moving, align_options, pair_seed(seed, reference.index, moving.index),
-                   known);
+    auto found = follow_next(reference, load(at[k + 1]).image, points);
+    // Algorithm 2 goes by a mean flow that fast motion escapes, and a near wall's beside a far
+    // one's: the next key frame then comes too late, and the points are lost on the way to it.
+    // The one half way becomes a key frame too.
+    const auto kept = [](const std::optional<PairAlignment>& pair) {
+      return pair ? pair->point_index.size() : 0;
     };
-    // To the next key frame: whatever the motion, or else as it was before.
-    const auto follow_next = [&](const AlignImage& next) {
-      auto found = follow(next, {}, true);
-      if (!found && previous) found = follow(next, continued(*previous, next.index, size), true);
-      return found;
-    };
-    std::vector<std::optional<PairAlignment>> found;
-    if (k + 1 < at.size()) {
-      found.push_back(follow_next(load(at[k + 1]).image));
-      // Algorithm 2 goes by a mean flow that fast motion escapes, and a near wall's beside a far
-      // one's: the next key frame then comes too late, and the points are lost on the way to it.
-      // The one half way becomes a key frame too.
-      const auto kept = [](const std::optional<PairAlignment>& pair) {
-        return pair ? pair->point_index.size() : 0;
-      };
-      const double enough = kMinFollowedShare * static_cast<double>(points.size());
-      for (int next = at[k + 1];
-           static_cast<double>(kept(found[0])) < enough && next - at[k] > 1;) {
-        next = at[k] + (next - at[k]) / 2;
-        auto nearer = follow_next(load(next).image);
-        if (kept(nearer) <= kept(found[0])) continue;
-        found[0] = std::move(nearer);
-        at.insert(at.begin() + static_cast<std::ptrdiff_t>(k) + 1, next);
-      }
-      // Few even so: what was found shows the way to the rest, or the motion before does.
-      const AlignImage& next = load(at[k + 1]).image;
-      for (int round = 0; round < kMoreRounds && static_cast<double>(kept(found[0])) < enough;
-           ++round) {
-        std::vector<cv::Mat> guesses;
-        if (found[0]) guesses.push_back(continued_from(*found[0], next.index, size));
-        if (previous) guesses.push_back(continued(*previous, next.index, size));
-        for (const cv::Mat& guess : guesses)
-          if (auto more = follow(next, guess, true); kept(more) > kept(found[0]))
-            found[0] = std::move(more);
-      }
+    const double enough = kMinFollowedShare * static_cast<double>(points.size());
+    for (int next = at[k + 1]; static_cast<double>(kept(found)) < enough && next - at[k] > 1;) {
+      next = at[k] + (next - at[k]) / 2;
+      auto nearer = follow_next(reference, load(next).image, points);
+      if (kept(nearer) <= kept(found)) continue;
+      found = std::move(nearer);
+      at.insert(at.begin() + static_cast<std::ptrdiff_t>(k) + 1, next);
+      ++between;
     }
+    // Few even so: what was found shows the way to the rest, or the motion before does.
+    const AlignImage& next = load(at[k + 1]).image;
+    for (int round = 0; round < kMoreRounds && static_cast<double>(kept(found)) < enough; ++round) {
+      std::vector<cv::Mat> guesses;
+      if (found) guesses.push_back(continued_from(*found, next.index, size));
+      if (previous) guesses.push_back(continued(*previous, next.index, size));
+      for (const cv::Mat& guess : guesses)
+        if (auto more = follow(reference, next, points, guess, true); kept(more) > kept(found))
+          found = std::move(more);
+    }
+    return found;
+  }
+
+  // Follows from key frame k.
+  void step() {
+    look_back(load(at[k]).image);
+    const std::vector<Vec2> points = chain.starts(at[k], load(at[k]).corners, spacing_px);
+    std::vector<std::optional<PairAlignment>> found;
+    if (k + 1 < at.size()) found.push_back(to_the_next(points));
+    const AlignImage& reference = load(at[k]).image;
+    const cv::Size size = reference.gray.size();
     // To those after it: the motion to the next goes on.
     const std::size_t count =
         std::min(at.size() - 1 - k, static_cast<std::size_t>(align_options.neighbours));
@@ -261,8 +204,9 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
       tasks.run([&, i] {
         const AlignImage& moving = prepared.at(at[k + 1 + i]).image;
         if (found[0])
-          found[i] = follow(moving, continued_from(*found[0], moving.index, size), false);
-        if (!found[i]) found[i] = follow(moving, {}, false);
+          found[i] = follow(reference, moving, points,
+                            continued_from(*found[0], moving.index, size), false);
+        if (!found[i]) found[i] = follow(reference, moving, points, {}, false);
       });
     }
     // Meanwhile, what the next key frame will ask for first.
@@ -289,18 +233,54 @@ Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
       chain.add(found[i]->moving, found[i]->point_index, found[i]->moving_px, spacing_px);
       memory.link(found[i]->reference, found[i]->moving);
       if (i == 0) previous = found[0];
-      followed.pairs.push_back(std::move(*found[i]));
+      pairs.push_back(std::move(*found[i]));
     }
-    if (std::ranges::binary_search(keyframes.frames, at[k])) progress.step();
     if (k + 1 < at.size()) prepared.erase(prepared.begin(), prepared.lower_bound(at[k + 1]));
+    ++k;
   }
-  followed.tracks = chain.finish();
-  number_keyframes(followed.tracks, at);
-  set_rays(followed.tracks, frames.lens());
-  progress.end(fmt::format("{} pairs, {} failed, {} tracks, {} key frames more{}",
-                           followed.pairs.size(), failed, followed.tracks.size(),
-                           at.size() - keyframes.frames.size(),
-                           bridges > 0 ? fmt::format(", {} gaps bridged", bridges) : ""));
+};
+
+TrackFollower::TrackFollower(const FrameSource& frames, const AlignOptions& align_options,
+                             const TrackOptions& options, std::uint64_t seed)
+    : impl_(std::make_unique<Impl>(frames, align_options, options, seed)) {}
+TrackFollower::~TrackFollower() = default;
+
+void TrackFollower::add(int frame) {
+  Impl& s = *impl_;
+  check(s.at.empty() || frame > s.at.back(), "key frame {} after {}, expected a later one", frame,
+        s.at.empty() ? -1 : s.at.back());
+  s.at.push_back(frame);
+  // One more than it is followed to: what is looked ahead at.
+  while (s.k + 1 + static_cast<std::size_t>(s.align_options.neighbours) < s.at.size()) s.step();
+}
+
+Followed TrackFollower::finish() {
+  Impl& s = *impl_;
+  while (s.k < s.at.size()) s.step();
+  Followed followed{s.at, std::move(s.pairs), s.chain.finish()};
+  number_keyframes(followed.tracks, followed.keyframes);
+  set_rays(followed.tracks, s.frames.lens());
+  return followed;
+}
+
+std::string TrackFollower::remark() const {
+  const Impl& s = *impl_;
+  return fmt::format("{} failed, {} key frames more{}", s.failed, s.between,
+                     s.bridges > 0 ? fmt::format(", {} gaps bridged", s.bridges) : "");
+}
+
+Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
+                       const AlignOptions& align_options, const TrackOptions& options,
+                       std::uint64_t seed, Progress& progress) {
+  progress.begin("pairwise alignment", keyframes.frames.size());
+  TrackFollower follower(frames, align_options, options, seed);
+  for (const int frame : keyframes.frames) {
+    follower.add(frame);
+    progress.step();
+  }
+  Followed followed = follower.finish();
+  progress.end(fmt::format("{} pairs, {} tracks, {}", followed.pairs.size(), followed.tracks.size(),
+                           follower.remark()));
   return followed;
 }
 

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files.h"
+#include "tests/shared_data.h"
 
 namespace rugae {
 namespace {
@@ -16,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 TEST(RealDataLoop, TheAnatomicalStomach) {
-  const fs::path mesh = fs::path(RUGAE_SHARED_DATA) / "meshes/stomach_bodyparts3d_FMA7148.ply";
+  const fs::path mesh = shared_data() / "meshes/stomach_bodyparts3d_FMA7148.ply";
   if (!fs::exists(mesh)) GTEST_SKIP() << mesh << " is not there";
   const fs::path folder = fs::temp_directory_path() / "rugae_real_loop";
   fs::remove_all(folder);

@@ -16,6 +16,7 @@
 #include "core/random.h"
 #include "recon/chessboard.h"
 #include "synthetic_texture.h"
+#include "tests/shared_data.h"
 
 namespace rugae {
 namespace {
@@ -297,7 +298,7 @@ double median_disagreement_px(const std::vector<CalibrationImage>& found,
 class RealDataCalibration : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(RealDataCalibration, PublishedCornersGiveThePublishedLens) {
-  const fs::path folder = fs::path(RUGAE_SHARED_DATA) / "calibration" / GetParam();
+  const fs::path folder = shared_data() / "calibration" / GetParam();
   if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not here";
   auto values = published(folder);
   CalibrationOptions options;
@@ -318,7 +319,7 @@ TEST_P(RealDataCalibration, PublishedCornersGiveThePublishedLens) {
 }
 
 TEST_P(RealDataCalibration, RealPicturesBelowOnePixel) {
-  const fs::path folder = fs::path(RUGAE_SHARED_DATA) / "calibration" / GetParam();
+  const fs::path folder = shared_data() / "calibration" / GetParam();
   if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not here";
   auto values = published(folder);
   CalibrationOptions options;

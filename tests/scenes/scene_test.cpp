@@ -16,6 +16,7 @@
 #include "core/yaml.h"
 #include "scenes/scene_file.h"
 #include "tests/scenes/scene_files.h"
+#include "tests/shared_data.h"
 
 namespace rugae {
 namespace {
@@ -264,7 +265,7 @@ TEST_F(SceneFiles, TheExampleIsValidAndShowsTheDefaults) {
 }
 
 TEST(RealDataScene, TheAnatomicalStomachBecomesAWall) {
-  const fs::path file = fs::path(RUGAE_SHARED_DATA) / "meshes/stomach_bodyparts3d_FMA7148.ply";
+  const fs::path file = shared_data() / "meshes/stomach_bodyparts3d_FMA7148.ply";
   if (!fs::exists(file)) GTEST_SKIP() << "no " << file;
   const Scene scene =
       load_scene({.name_or_path = file.string(), .seed = 1, .resolution = "medium", .oil = 0.0});

@@ -13,6 +13,7 @@
 #include "core/units.h"
 #include "scenes/scene.h"
 #include "scenes/stomach.h"
+#include "tests/shared_data.h"
 #include "tests/trajectories/cavities.h"
 
 namespace rugae {
@@ -111,7 +112,7 @@ TEST(Plan, FillsTheStomachsOfOtherSeeds) {
   }
 }
 TEST(RealDataPlan, FillsTheBodyParts3dStomach) {
-  const std::filesystem::path file = RUGAE_SHARED_DATA "/meshes/stomach_bodyparts3d_FMA7148.ply";
+  const std::filesystem::path file = shared_data() / "meshes/stomach_bodyparts3d_FMA7148.ply";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not here";
   const TriangleMesh wall = read_mesh(file);
   for (const std::uint64_t seed : {1u, 2u, 3u}) check_styles(check_all(wall, seed));
