@@ -19,13 +19,13 @@ void on_interrupt(int) {
   interrupted = 1;
 }
 
+}  // namespace
+
 double peak_rss_mb() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts KiB
 }
-
-}  // namespace
 
 Progress::Progress(Output output)
     : silent_(output == Output::silent), terminal_(isatty(STDERR_FILENO) != 0) {}

@@ -15,6 +15,9 @@ struct StageTime {
   double peak_rss_mb = 0.0;  // of the whole process, at the end of the stage
 };
 
+/// The most memory that the process has held so far.
+double peak_rss_mb();
+
 class Progress {
  public:
   enum class Output { automatic, silent };

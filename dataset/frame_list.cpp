@@ -1,19 +1,31 @@
 #include "dataset/frame_list.h"
 
+#include <fstream>
+
 #include "core/check.h"
 #include "dataset/csv.h"
 
 namespace rugae {
 namespace {
 constexpr const char* kHeader = "index,time_s,exposure_s,gain";
+
+std::string line_of(std::size_t index, const FrameRecord& frame) {
+  return fmt::format("{},{:.17g},{:.17g},{:.17g}\n", index, frame.time_s, frame.exposure_s,
+                     frame.gain);
+}
+
 }  // namespace
 
 std::string frame_list_text(const std::vector<FrameRecord>& frames) {
   std::string text = std::string(kHeader) + "\n";
-  for (std::size_t i = 0; i < frames.size(); ++i)
-    text += fmt::format("{},{:.17g},{:.17g},{:.17g}\n", i, frames[i].time_s, frames[i].exposure_s,
-                        frames[i].gain);
+  for (std::size_t i = 0; i < frames.size(); ++i) text += line_of(i, frames[i]);
   return text;
+}
+
+void append_frame(const std::filesystem::path& file, int index, const FrameRecord& frame) {
+  std::ofstream stream(file, std::ios::app);
+  stream << line_of(static_cast<std::size_t>(index), frame) << std::flush;
+  check(stream.good(), "{}: cannot be written", file.string());
 }
 
 std::vector<FrameRecord> read_frame_list(const std::filesystem::path& file) {

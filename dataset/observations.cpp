@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 
 #include "core/check.h"
+#include "core/files.h"
 #include "dataset/frame_list.h"
 #include "dataset/image_io.h"
 
@@ -81,17 +83,15 @@ Source of_images(const fs::path& folder, double fps) {
 }
 
 // All rows are read before those of the next frame.
-double checked_row_time_s(const Calibration& calibration, const fs::path& file,
-                          const std::vector<double>& times_s) {
+void check_row_time(double row_time_s, int rows, double frame_s, const fs::path& file) {
   constexpr double kRounding = 1.001;  // of times and row times in files
-  const double row_time_s = 1e-6 * calibration.row_time_us.value_or(0.0);
-  const double frame_s =
-      (times_s.back() - times_s.front()) / (static_cast<double>(times_s.size()) - 1.0);
-  check(row_time_s * calibration.lens.height <= kRounding * frame_s,
+  check(row_time_s * rows <= kRounding * frame_s,
         "{}: row_time_us is {}, {} rows take {:.3g} s, but frames are {:.3g} s apart",
-        file.string(), 1e6 * row_time_s, calibration.lens.height,
-        row_time_s * calibration.lens.height, frame_s);
-  return row_time_s;
+        file.string(), 1e6 * row_time_s, rows, row_time_s * rows, frame_s);
+}
+
+double row_time_s_of(const Calibration& calibration) {
+  return 1e-6 * calibration.row_time_us.value_or(0.0);
 }
 
 }  // namespace
@@ -122,7 +122,11 @@ Observations Observations::open(const fs::path& folder, const fs::path& calibrat
   }
   observations.lights_ = chosen.lights.value_or(std::vector<Emitter>{});
   observations.lens_ = chosen.lens;
-  observations.row_time_s_ = checked_row_time_s(chosen, source.calibration, source.times_s);
+  observations.row_time_s_ = row_time_s_of(chosen);
+  check_row_time(observations.row_time_s_, chosen.lens.height,
+                 (source.times_s.back() - source.times_s.front()) /
+                     (static_cast<double>(source.times_s.size()) - 1.0),
+                 source.calibration);
   observations.files_ = std::move(source.files);
   observations.times_s_ = std::move(source.times_s);
   const fs::path absolute = fs::absolute(folder).lexically_normal();
@@ -130,6 +134,41 @@ Observations Observations::open(const fs::path& folder, const fs::path& calibrat
       (absolute.has_filename() ? absolute : absolute.parent_path()).filename().string();
   (void)observations.image(0);  // its size against the lens, before work begins
   return observations;
+}
+
+Observations Observations::record(const fs::path& folder, const Calibration& calibration) {
+  check(!fs::exists(folder / "frames.csv") && !fs::exists(folder / "frames"),
+        "{}: has frames already, expected a folder to record into", folder.string());
+  make_folder(folder / "frames");
+  write_atomic(folder / "calibration.yaml", calibration_yaml(calibration, "as it was recorded"));
+  write_atomic(folder / "frames.csv", frame_list_text({}));
+  Observations observations;
+  observations.recording_ = folder;
+  observations.name_ = fs::absolute(folder).lexically_normal().filename().string();
+  observations.lens_ = calibration.lens;
+  observations.row_time_s_ = row_time_s_of(calibration);
+  observations.lights_ = calibration.lights.value_or(std::vector<Emitter>{});
+  return observations;
+}
+
+void Observations::append(const cv::Mat& bgr, double time_s) {
+  check(!recording_.empty(), "{}: is not being recorded", name_);
+  check(bgr.type() == CV_8UC3 && bgr.cols == lens_.width && bgr.rows == lens_.height,
+        "{}: frame {} is {} x {} px of type {}, expected {} x {} px, 8-bit BGR",
+        recording_.string(), size(), bgr.cols, bgr.rows, bgr.type(), lens_.width, lens_.height);
+  if (times_s_.empty()) {
+    check(std::isfinite(time_s), "{}: frame 0 is at {} s", recording_.string(), time_s);
+  } else {
+    check(std::isfinite(time_s) && time_s > times_s_.back(),
+          "{}: frame {} is at {} s, expected after {} s", recording_.string(), size(), time_s,
+          times_s_.back());
+    check_row_time(row_time_s_, lens_.height, time_s - times_s_.back(), recording_);
+  }
+  const fs::path file = recording_ / "frames" / fmt::format("{:06}.png", size());
+  write_image(file, bgr);
+  append_frame(recording_ / "frames.csv", size(), {time_s, 0.0, 1.0});
+  files_.push_back(file);
+  times_s_.push_back(time_s);
 }
 
 cv::Mat Observations::image(int index) const {

@@ -26,6 +26,14 @@ class Observations {
   static Observations open(const std::filesystem::path& folder,
                            const std::filesystem::path& calibration = {}, double fps = 30.0);
 
+  /// Frames that are yet to come: makes `folder` an observations folder without frames. Throws
+  /// Error where it has some.
+  static Observations record(const std::filesystem::path& folder, const Calibration& calibration);
+  /// Writes one frame more into the folder, as PNG. Throws Error for an image of another size than
+  /// the lens', another type than CV_8UC3, and times that do not ascend or leave no time for the
+  /// rows.
+  void append(const cv::Mat& bgr, double time_s);
+
   int size() const { return static_cast<int>(files_.size()); }
   const Lens& lens() const { return lens_; }
   /// Of the middle row.
@@ -43,6 +51,7 @@ class Observations {
 
  private:
   std::string name_;
+  std::filesystem::path recording_;  // the folder that append() writes to
   Lens lens_;
   double row_time_s_ = 0.0;
   std::vector<Emitter> lights_;

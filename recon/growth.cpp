@@ -241,54 +241,70 @@ void adjust_all(Structure& structure, double focal_px, const BundleOptions& opti
   }
 }
 
-bool grow_segment(Structure& s, const std::vector<char>& available, double focal_px,
-                  const BundleOptions& options, Progress& progress) {
-  const double max_px = kOutlierHubers * options.huber_px;
-  const auto start = best_start(s, available, focal_px, options);
+SegmentGrowth::SegmentGrowth(Structure& structure, double focal_px, const BundleOptions& options)
+    : structure_(structure), focal_px_(focal_px), options_(options) {}
+
+bool SegmentGrowth::begin(const std::vector<char>& available) {
+  const auto start = best_start(structure_, available, focal_px_, options_);
   if (!start) return false;
-  begin_with(s, *start, options);
-  progress.step(2);
-  int placed = 2, placed_at_global = 2;
+  begin_with(structure_, *start, options_);
+  placed_ = 2;
+  adjust_globally();
+  return true;
+}
+
+void SegmentGrowth::adjust_globally() {
   BundleScope global;
   global.max_iterations = kGlobalIterations;
   global.function_tolerance = 1e-4;
-  bundle_adjust(s, focal_px, options, global);
-  update_points(s, focal_px, max_px, options);
+  bundle_adjust(structure_, focal_px_, options_, global);
+  update_points(structure_, focal_px_, kOutlierHubers * options_.huber_px, options_);
+  placed_at_global_ = placed_;
+}
 
-  std::vector<int> tried(s.frames.size(), 0);  // with how many points it failed
+void SegmentGrowth::extend(const std::vector<char>& available, Progress& progress) {
+  Structure& s = structure_;
+  const double max_px = kOutlierHubers * options_.huber_px;
+  tried_.resize(s.frames.size(), 0);
   for (;;) {
     const std::vector<int> counts = known_counts(s, available);
     int next = -1;
     for (int k = 0; k < static_cast<int>(counts.size()); ++k) {
-      if (counts[k] < options.min_resection_inliers || counts[k] <= tried[k]) continue;
+      if (counts[k] < options_.min_resection_inliers || counts[k] <= tried_[k]) continue;
       if (next < 0 || counts[k] > counts[next]) next = k;
     }
     if (next < 0) break;
     std::vector<Vec3> points;
     std::vector<Vec2> rays;
     known_points(s, next, points, rays);
-    const auto placement = place_by_points(points, rays, focal_px, options);
+    const auto placement = place_by_points(points, rays, focal_px_, options_);
     if (!placement) {
-      tried[next] = counts[next];
+      tried_[next] = counts[next];
       continue;
     }
     s.placed[next] = true;
     s.cam_from_world[next] = placement->cam_from_world;
-    ++placed;
+    ++placed_;
     progress.step();
-    triangulate_seen(s, next, focal_px, max_px, options);
-    if (placed >= kGlobalGrowth * placed_at_global) {
-      bundle_adjust(s, focal_px, options, global);
-      update_points(s, focal_px, max_px, options);
-      placed_at_global = placed;
+    triangulate_seen(s, next, focal_px_, max_px, options_);
+    if (placed_ >= kGlobalGrowth * placed_at_global_) {
+      adjust_globally();
     } else {
       BundleScope local;
       local.free_keyframes = neighbourhood(s, next);
       local.max_iterations = kLocalIterations;
       local.function_tolerance = 1e-3;
-      bundle_adjust(s, focal_px, options, local);
+      bundle_adjust(s, focal_px_, options_, local);
     }
   }
+}
+
+bool grow_segment(Structure& structure, const std::vector<char>& available, double focal_px,
+                  const BundleOptions& options, Progress& progress) {
+  SegmentGrowth growth(structure, focal_px, options);
+  if (!growth.begin(available)) return false;
+  progress.step(2);
+  growth.extend(available, progress);
   return true;
 }
 

@@ -39,10 +39,11 @@ struct Candidate {
   FlowImage image;  // shrunk
 };
 
-// Frames begin .. begin + kReadAhead - 1, shrunk, prepared in parallel; `valid` is as small.
-std::vector<Candidate> prepare(const FrameSource& frames, int begin, int shrink,
+// Frames begin .. begin + kReadAhead - 1, those before `end`, shrunk, prepared in parallel; `valid`
+// is as small.
+std::vector<Candidate> prepare(const FrameSource& frames, int begin, int end, int shrink,
                                const cv::Mat& valid) {
-  const int count = std::max(0, std::min(kReadAhead, frames.size() - begin));
+  const int count = std::max(0, std::min(kReadAhead, end - begin));
   std::vector<Candidate> block(static_cast<std::size_t>(count));
   tbb::parallel_for(0, count, [&](int i) {
     cv::Mat gray = frames.gray(begin + i);
@@ -51,6 +52,13 @@ std::vector<Candidate> prepare(const FrameSource& frames, int begin, int shrink,
     block[static_cast<std::size_t>(i)] = {begin + i, prepare_flow(gray, valid)};
   });
   return block;
+}
+
+// 255 where all of the shrunk pixel is valid.
+cv::Mat shrunk_valid(cv::Mat valid, int shrink) {
+  if (shrink > 1)
+    cv::resize(valid, valid, {valid.cols / shrink, valid.rows / shrink}, 0, 0, cv::INTER_AREA);
+  return valid == 255;
 }
 
 // The state of algorithm 2 between two frames.
@@ -84,7 +92,7 @@ class Selection {
     }
   }
 
-  Keyframes take() { return std::move(keys_); }
+  const Keyframes& keyframes() const { return keys_; }
 
  private:
   Candidate next() {
@@ -131,34 +139,53 @@ class Selection {
 
 }  // namespace
 
-Keyframes select_keyframes(const FrameSource& frames, const KeyframeOptions& options,
-                           Progress& progress) {
+struct KeyframeSelector::Impl {
+  const FrameSource& frames;
+  int shrink;
+  cv::Mat valid;  // shrunk
+  Selection selection;
+  int next = 0;
+
+  Impl(const FrameSource& source, const KeyframeOptions& options)
+      : frames(source),
+        shrink(std::max(1, source.lens().width / kWorkWidthPx)),
+        valid(shrunk_valid(source.valid(), shrink)),
+        selection(options.mean_flow_px * source.lens().width / kReferenceWidthPx, options.max_gap,
+                  shrink, valid) {}
+};
+
+KeyframeSelector::KeyframeSelector(const FrameSource& frames, const KeyframeOptions& options) {
   options.check();
-  const int width = frames.lens().width;
-  const int shrink = std::max(1, width / kWorkWidthPx);
-  cv::Mat valid = frames.valid();
-  if (shrink > 1)
-    cv::resize(valid, valid, {valid.cols / shrink, valid.rows / shrink}, 0, 0, cv::INTER_AREA);
-  valid = valid == 255;
-  Selection selection(options.mean_flow_px * width / kReferenceWidthPx, options.max_gap, shrink,
-                      valid);
-  progress.begin("key frames", static_cast<std::size_t>(frames.size()));
-  std::vector<Candidate> block = prepare(frames, 0, shrink, valid);
+  impl_ = std::make_unique<Impl>(frames, options);
+}
+KeyframeSelector::~KeyframeSelector() = default;
+
+void KeyframeSelector::advance(int end, const std::function<void()>& looked) {
+  Impl& s = *impl_;
+  std::vector<Candidate> block = prepare(s.frames, s.next, end, s.shrink, s.valid);
   while (!block.empty()) {
-    const int next = block.back().index + 1;
-    std::future<std::vector<Candidate>> ahead =
-        std::async(std::launch::async, [&] { return prepare(frames, next, shrink, valid); });
+    s.next = block.back().index + 1;
+    std::future<std::vector<Candidate>> ahead = std::async(
+        std::launch::async, [&] { return prepare(s.frames, s.next, end, s.shrink, s.valid); });
     for (const Candidate& frame : block) {
-      selection.offer(frame);
-      selection.run(false);
-      progress.step();
+      s.selection.offer(frame);
+      s.selection.run(false);
+      if (looked) looked();
     }
     block = ahead.get();
   }
-  selection.run(true);
-  Keyframes keys = selection.take();
-  progress.end(fmt::format("{} of {} frames", keys.frames.size(), frames.size()));
-  return keys;
+  s.selection.run(true);
+}
+
+const Keyframes& KeyframeSelector::keyframes() const { return impl_->selection.keyframes(); }
+
+Keyframes select_keyframes(const FrameSource& frames, const KeyframeOptions& options,
+                           Progress& progress) {
+  KeyframeSelector selector(frames, options);
+  progress.begin("key frames", static_cast<std::size_t>(frames.size()));
+  selector.advance(frames.size(), [&] { progress.step(); });
+  progress.end(fmt::format("{} of {} frames", selector.keyframes().frames.size(), frames.size()));
+  return selector.keyframes();
 }
 
 }  // namespace rugae

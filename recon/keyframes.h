@@ -2,6 +2,8 @@
 // Key frames, the paper's algorithm 2: mean magnitude of the Farneback flow since the last key
 // frame.
 
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include "core/progress.h"
@@ -16,6 +18,23 @@ struct Keyframes {
   std::vector<double> mean_flow_px;  // of each to the one before; 0 for the first
 };
 
+/// Frame after frame, as far as they have come.
+class KeyframeSelector {
+ public:
+  KeyframeSelector(const FrameSource& frames, const KeyframeOptions& options);
+  ~KeyframeSelector();
+
+  /// Looks at the frames up to before `end` that it has not looked at; `looked` is called for each.
+  /// Those chosen do not depend on how many come at a time.
+  void advance(int end, const std::function<void()>& looked = {});
+  const Keyframes& keyframes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// All of a sequence.
 Keyframes select_keyframes(const FrameSource& frames, const KeyframeOptions& options,
                            Progress& progress);
 

@@ -22,12 +22,8 @@ void keep_for_pictures(std::vector<PairAlignment>& pairs) {
 
 }  // namespace
 
-Motion estimate_motion(const FrameSource& frames, const ReconOptions& options, const Stages& stages,
-                       Progress& progress) {
-  const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());    // of the caller
-  const Keyframes keys = select_keyframes(frames, options.keyframes, progress);  // algorithm 2
-  // Algorithm 3: steps 2 to 6, pairs; step 7, all poses jointly.
-  Followed followed = stages.follow(frames, keys, options, progress);
+Motion solve_motion(const FrameSource& frames, Followed followed, const ReconOptions& options,
+                    const Stages& stages, Progress& progress) {
   Motion motion;
   motion.structure =
       stages.structure(frames, followed.keyframes, std::move(followed.tracks), options, progress);
@@ -35,8 +31,6 @@ Motion estimate_motion(const FrameSource& frames, const ReconOptions& options, c
   progress.end();
   motion.pairs = std::move(followed.pairs);
   keep_for_pictures(motion.pairs);
-  motion.stages.assign(progress.stages().begin() + earlier, progress.stages().end());
-
   const auto usable =
       std::ranges::count_if(motion.cam_from_world, [](const auto& p) { return p.has_value(); });
   check(
@@ -44,6 +38,17 @@ Motion estimate_motion(const FrameSource& frames, const ReconOptions& options, c
       "{}: {} usable frames of {}, expected at least 2: the others show too little texture, light "
       "or common wall to be placed",
       frames.observations().name(), usable, frames.size());
+  return motion;
+}
+
+Motion estimate_motion(const FrameSource& frames, const ReconOptions& options, const Stages& stages,
+                       Progress& progress) {
+  const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());    // of the caller
+  const Keyframes keys = select_keyframes(frames, options.keyframes, progress);  // algorithm 2
+  // Algorithm 3: steps 2 to 6, pairs; step 7, all poses jointly.
+  Followed followed = stages.follow(frames, keys, options, progress);
+  Motion motion = solve_motion(frames, std::move(followed), options, stages, progress);
+  motion.stages.assign(progress.stages().begin() + earlier, progress.stages().end());
   return motion;
 }
 

@@ -28,6 +28,10 @@ struct Motion {
 Motion estimate_motion(const FrameSource& frames, const ReconOptions& options, const Stages& stages,
                        Progress& progress);
 
+/// The same from tracks that were followed already.
+Motion solve_motion(const FrameSource& frames, Followed followed, const ReconOptions& options,
+                    const Stages& stages, Progress& progress);
+
 /// The options with all that estimate_motion does not look at set to defaults: where two of these
 /// are the same, so is the motion.
 ReconOptions motion_options(ReconOptions options);

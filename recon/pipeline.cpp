@@ -14,6 +14,7 @@
 #include "recon/map.h"
 #include "recon/mosaic.h"
 #include "recon/pictures.h"
+#include "recon/reconstruction.h"
 #include "recon/spread.h"
 
 namespace rugae {
@@ -62,13 +63,6 @@ void write_depth(const EstimateLayout& layout, const TriangleMesh& map, const St
   progress.end();
 }
 
-void add(DenseMap map, Estimate& estimate) {
-  estimate.map = std::move(map.mesh);
-  estimate.numbers["depth_maps"] = map.depth_maps;
-  estimate.numbers["depth_share"] = map.depth_share;
-  estimate.numbers["median_sigma_over_depth"] = map.median_sigma;
-}
-
 // What a reader of estimate.json wants to know of the run.
 Estimate estimate_of(const Observations& observations, const ReconOptions& options,
                      const Motion& motion) {
@@ -107,6 +101,28 @@ Estimate estimate_of(const Observations& observations, const ReconOptions& optio
 
 }  // namespace
 
+MadeMap make_map(const FrameSource& frames, const Structure& structure,
+                 const std::vector<PairAlignment>& pairs, const ReconOptions& options,
+                 const Stages& stages, Progress& progress) {
+  MadeMap made;
+  if (options.method == "dense") {
+    DenseMap map = build_dense_map(frames, structure, options.preprocess.reflections, options.dense,
+                                   options.pictures ? kPictures : 0, progress);
+    made.mesh = std::move(map.mesh);
+    made.examples = std::move(map.examples);
+    made.numbers = {{"depth_maps", map.depth_maps},
+                    {"depth_share", map.depth_share},
+                    {"median_sigma_over_depth", map.median_sigma}};
+    return made;
+  }
+  progress.begin("mosaics");  // algorithm 3, steps 8 to 10
+  made.mosaics = compose_mosaics(frames, structure, pairs, options.mosaic);
+  made.depths = place_all(made.mosaics, structure, frames.lens(), options, stages, progress);
+  progress.begin("map");
+  made.mesh = fuse_map(made.mosaics, made.depths, structure, frames.lens(), options.map);
+  return made;
+}
+
 Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconOptions& options,
                    const std::filesystem::path& out, const Stages& stages, Progress& progress) {
   const EstimateLayout layout{out};
@@ -116,21 +132,9 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
   const Structure& structure = motion.structure;
 
   Estimate estimate = estimate_of(frames.observations(), options, motion);
-  std::vector<Mosaic> mosaics;
-  std::vector<std::optional<MosaicDepth>> depths;
-  std::vector<DepthExample> examples;
-  if (options.method == "dense") {
-    DenseMap map = build_dense_map(frames, structure, options.preprocess.reflections, options.dense,
-                                   options.pictures ? kPictures : 0, progress);
-    examples = std::move(map.examples);
-    add(std::move(map), estimate);
-  } else {
-    progress.begin("mosaics");  // algorithm 3, steps 8 to 10
-    mosaics = compose_mosaics(frames, structure, motion.pairs, options.mosaic);
-    depths = place_all(mosaics, structure, frames.lens(), options, stages, progress);
-    progress.begin("map");
-    estimate.map = fuse_map(mosaics, depths, structure, frames.lens(), options.map);
-  }
+  MadeMap made = make_map(frames, structure, motion.pairs, options, stages, progress);
+  estimate.map = std::move(made.mesh);
+  estimate.numbers.insert(made.numbers.begin(), made.numbers.end());
   // The paper's method takes every shutter for a global one.
   const std::vector<CameraMotion> motions =
       options.method == "dense" ? keyframe_motions(frames, structure)
@@ -145,9 +149,9 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
                 spread(static_cast<int>(structure.frames.size()), kPictures));
     draw_links(layout.pictures(), structure);
     if (options.method == "dense")
-      draw_depth_maps(layout.pictures(), examples, options.dense.max_sigma_share);
+      draw_depth_maps(layout.pictures(), made.examples, options.dense.max_sigma_share);
     else
-      draw_mosaics(layout.pictures(), mosaics, depths, 2 * kPictures);
+      draw_mosaics(layout.pictures(), made.mosaics, made.depths, 2 * kPictures);
   }
   progress.end();
   estimate.stages = motion.stages;
@@ -159,13 +163,14 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
 
 Estimate reconstruct(const Observations& observations, const ReconOptions& options,
                      const std::filesystem::path& out, Progress& progress) {
-  options.check();
   make_folder(out);
-  const Stages stages;
-  progress.begin("preprocessing");
-  const FrameSource frames(observations, options.preprocess);  // section 2.1
-  const Motion motion = estimate_motion(frames, options, stages, progress);
-  return build_map(frames, motion, options, out, stages, progress);
+  Reconstruction reconstruction(observations, options);
+  progress.begin("frames", static_cast<std::size_t>(observations.size()));
+  while (reconstruction.size() < observations.size()) {
+    reconstruction.add();
+    progress.step();
+  }
+  return reconstruction.finish(out, progress);
 }
 
 }  // namespace rugae

@@ -2,11 +2,16 @@
 // Reconstruction: observations in, estimate out. Never truth.
 
 #include <filesystem>
+#include <map>
 #include <string>
+#include <vector>
 
 #include "core/progress.h"
 #include "dataset/estimate.h"
 #include "dataset/observations.h"
+#include "recon/dense/dense_map.h"
+#include "recon/map.h"
+#include "recon/mosaic.h"
 #include "recon/motion.h"
 #include "recon/options.h"
 #include "recon/stages.h"
@@ -17,6 +22,20 @@ namespace rugae {
 /// for fewer than two usable frames; frames that cannot be placed are `lost`, not errors.
 Estimate reconstruct(const Observations& observations, const ReconOptions& options,
                      const std::filesystem::path& out, Progress& progress);
+
+/// A map, and what it was made from: for pictures.
+struct MadeMap {
+  TriangleMesh mesh;  // in the structure's world
+  std::map<std::string, double> numbers;
+  std::vector<DepthExample> examples;              // of `dense`
+  std::vector<Mosaic> mosaics;                     // of `paper`
+  std::vector<std::optional<MosaicDepth>> depths;  // of each
+};
+
+/// `pairs` of neighbouring key frames.
+MadeMap make_map(const FrameSource& frames, const Structure& structure,
+                 const std::vector<PairAlignment>& pairs, const ReconOptions& options,
+                 const Stages& stages, Progress& progress);
 
 /// The second half alone, with a motion from estimate_motion(), perhaps of an earlier run: mosaics,
 /// shape from shading, map, depth and pictures. `frames` are preprocessed as `options` say.

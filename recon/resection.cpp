@@ -39,6 +39,13 @@ struct Seen {
   Vec2 pixel;
 };
 
+std::vector<Seen> at_most(std::size_t count, const std::vector<Seen>& points) {
+  const std::size_t stride = 1 + points.size() / count;
+  std::vector<Seen> chosen;
+  for (std::size_t i = 0; i < points.size(); i += stride) chosen.push_back(points[i]);
+  return chosen;
+}
+
 // The triangulated points of each key frame, at most kMaxPoints of each.
 std::vector<std::vector<Seen>> points_seen(const Structure& structure) {
   std::vector<std::vector<Seen>> seen(structure.frames.size());
@@ -47,12 +54,7 @@ std::vector<std::vector<Seen>> points_seen(const Structure& structure) {
     for (const auto& o : track.observations)
       if (o.inlier) seen[o.keyframe].push_back({track.point, o.pixel});
   }
-  for (std::vector<Seen>& points : seen) {
-    const std::size_t stride = 1 + points.size() / kMaxPoints;
-    std::vector<Seen> chosen;
-    for (std::size_t i = 0; i < points.size(); i += stride) chosen.push_back(points[i]);
-    points = std::move(chosen);
-  }
+  for (std::vector<Seen>& points : seen) points = at_most(kMaxPoints, points);
   return seen;
 }
 
@@ -138,6 +140,34 @@ std::optional<Placement> place_by_points(const std::vector<Vec3>& points,
   if (placement.inliers < options.min_resection_inliers) return {};
   if (placement.inliers < kMinInlierShare * static_cast<double>(n)) return {};
   return placement;
+}
+
+std::optional<Rigid3> resect_frame(const FrameSource& frames, const Structure& structure, int frame,
+                                   const AlignOptions& align_options, const BundleOptions& options,
+                                   std::uint64_t seed) {
+  const std::vector<int> placed = placed_keyframes(structure);
+  if (placed.empty()) return std::nullopt;
+  const AlignField field = prepare_field(frames.valid(), align_options);
+  const cv::Mat none = cv::Mat::zeros(frames.valid().size(), CV_8U);
+  const AlignImage moving =
+      prepare_alignment({frame, frames.gray(frame), {}, none, frames.valid()}, field);
+  const Between around = between(structure, placed, frame);
+  for (const int k : around.keyframes) {
+    std::vector<Seen> points;
+    for (const Track& track : structure.tracks) {
+      if (!track.triangulated) continue;
+      for (const auto& o : track.observations)
+        if (o.keyframe == k && o.inlier) points.push_back({track.point, o.pixel});
+    }
+    points = at_most(kMaxPoints, points);
+    if (static_cast<int>(points.size()) < kMinPoints) continue;
+    const AlignImage reference = prepare_alignment(frames.pose_frame(structure.frames[k]), field);
+    const Sighted sighted = follow(frames.lens(), points, reference, moving, around.cam_from_world,
+                                   align_options, seed);
+    if (const auto found = place_by_points(sighted.points, sighted.rays, frames.lens().fx, options))
+      return found->cam_from_world;
+  }
+  return std::nullopt;
 }
 
 std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,

@@ -28,6 +28,12 @@ std::optional<Placement> place_by_points(const std::vector<Vec3>& points,
                                          const std::vector<Vec2>& rays, double focal_px,
                                          const BundleOptions& options);
 
+/// Pose of one frame, cam_from_world: the points of the placed key frames next to it are followed
+/// into it by `align`. Empty where that fails, or where none is placed.
+std::optional<Rigid3> resect_frame(const FrameSource& frames, const Structure& structure, int frame,
+                                   const AlignOptions& align_options, const BundleOptions& options,
+                                   std::uint64_t seed);
+
 /// Poses of all frames that are not placed key frames: the points of the nearest placed key frames
 /// before and after are followed into the frame by `align`. Empty where that fails: the frame is
 /// lost. cam_from_world; key frames keep their pose.

@@ -9,12 +9,17 @@
 
 namespace rugae {
 
+AlignOptions follow_options(const ReconOptions& options) {
+  AlignOptions align = options.align;
+  if (options.method == "dense") align.neighbours = options.revisits.neighbours;
+  return align;
+}
+
 Stages::Stages()
     : follow([](const FrameSource& frames, const Keyframes& keyframes, const ReconOptions& options,
                 Progress& progress) {
-        AlignOptions align = options.align;
-        if (options.method == "dense") align.neighbours = options.revisits.neighbours;
-        return follow_tracks(frames, keyframes, align, options.tracks, options.seed, progress);
+        return follow_tracks(frames, keyframes, follow_options(options), options.tracks,
+                             options.seed, progress);
       }),
       structure([](const FrameSource& frames, const std::vector<int>& keyframes,
                    std::vector<Track> tracks, const ReconOptions& options, Progress& progress) {

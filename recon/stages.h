@@ -16,6 +16,9 @@
 
 namespace rugae {
 
+/// How key frames are aligned, by the method.
+AlignOptions follow_options(const ReconOptions& options);
+
 struct Stages {
   /// Pairs and tracks of the key frames: follow_tracks().
   std::function<Followed(const FrameSource&, const Keyframes&, const ReconOptions&, Progress&)>

@@ -186,11 +186,15 @@ void rescale(Structure& s, double factor) {
   for (Track& track : s.tracks) track.point *= factor;
 }
 
-void settle_structure(Structure& s, double focal_px) {
+void remove_outliers(Structure& s) {
   for (Track& track : s.tracks)
     std::erase_if(track.observations,
                   [&](const auto& o) { return !o.inlier || !s.placed[o.keyframe]; });
   std::erase_if(s.tracks, [](const Track& track) { return !track.triangulated; });
+}
+
+void settle_structure(Structure& s, double focal_px) {
+  remove_outliers(s);
   normalise(s);
   double sum = 0.0;
   std::size_t count = 0;

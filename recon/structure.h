@@ -77,6 +77,10 @@ Structure build_structure(const std::vector<int>& frames, std::vector<Track> tra
 void finish_structure(Structure& structure, const Lens& lens, const BundleOptions& options,
                       const Adjustment& adjustment, Progress& progress);
 
+/// Removes observations that do not agree with their point, those of key frames that are not
+/// placed, and tracks without a point.
+void remove_outliers(Structure& structure);
+
 /// The end of the above without adjusting: for poses that are not to be moved.
 void settle_structure(Structure& structure, double focal_px);
 

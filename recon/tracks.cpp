@@ -85,6 +85,7 @@ struct TrackFollower::Impl {
   AlignOptions align_options;
   std::uint64_t seed;
   double spacing_px;
+  std::size_t needed;  // key frames behind k, before it is followed from
   AlignField field;
   std::vector<int> at;               // key frames, as selected and between; the first `k` are done
   std::size_t k = 0;                 // the next to follow from
@@ -101,11 +102,12 @@ struct TrackFollower::Impl {
   int failed = 0, bridges = 0, between = 0;
 
   Impl(const FrameSource& source, const AlignOptions& align, const TrackOptions& options,
-       std::uint64_t of_run)
+       std::uint64_t of_run, bool look_ahead)
       : frames(source),
         align_options(align),
         seed(of_run),
         spacing_px(options.spacing_px * source.lens().width / kReferenceWidth),
+        needed(static_cast<std::size_t>(align.neighbours) + (look_ahead ? 1 : 0)),
         field(prepare_field(source.valid(), align)),
         memory(source.valid()) {}
 
@@ -241,8 +243,8 @@ struct TrackFollower::Impl {
 };
 
 TrackFollower::TrackFollower(const FrameSource& frames, const AlignOptions& align_options,
-                             const TrackOptions& options, std::uint64_t seed)
-    : impl_(std::make_unique<Impl>(frames, align_options, options, seed)) {}
+                             const TrackOptions& options, std::uint64_t seed, bool ahead)
+    : impl_(std::make_unique<Impl>(frames, align_options, options, seed, ahead)) {}
 TrackFollower::~TrackFollower() = default;
 
 void TrackFollower::add(int frame) {
@@ -250,8 +252,7 @@ void TrackFollower::add(int frame) {
   check(s.at.empty() || frame > s.at.back(), "key frame {} after {}, expected a later one", frame,
         s.at.empty() ? -1 : s.at.back());
   s.at.push_back(frame);
-  // One more than it is followed to: what is looked ahead at.
-  while (s.k + 1 + static_cast<std::size_t>(s.align_options.neighbours) < s.at.size()) s.step();
+  while (s.k + s.needed < s.at.size()) s.step();
 }
 
 Followed TrackFollower::finish() {
@@ -262,6 +263,15 @@ Followed TrackFollower::finish() {
   set_rays(followed.tracks, s.frames.lens());
   return followed;
 }
+
+std::vector<int> TrackFollower::settled() const {
+  const Impl& s = *impl_;
+  const auto count = static_cast<std::ptrdiff_t>(std::min(s.k + 1, s.at.size()));
+  return {s.at.begin(), s.at.begin() + count};
+}
+
+const TrackChain& TrackFollower::chain() const { return impl_->chain; }
+const std::vector<PairAlignment>& TrackFollower::pairs() const { return impl_->pairs; }
 
 std::string TrackFollower::remark() const {
   const Impl& s = *impl_;

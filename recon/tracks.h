@@ -37,14 +37,21 @@ struct Followed {
 /// reflections, where the flow is best determined.
 class TrackFollower {
  public:
+  /// With `ahead` the next key frame but one is prepared while the next is followed to: twice as
+  /// fast, and the same, but that the tracks are known one key frame later.
   TrackFollower(const FrameSource& frames, const AlignOptions& align_options,
-                const TrackOptions& options, std::uint64_t seed);
+                const TrackOptions& options, std::uint64_t seed, bool ahead = true);
   ~TrackFollower();
 
   /// The next key frame; follows from those that all they are aligned to is known of.
   void add(int frame);
   /// Follows from the rest: nothing is to be added after it.
   Followed finish();
+  /// Key frames that no other will come between any more.
+  std::vector<int> settled() const;
+  /// What was followed so far; observations are numbered by the frame's index.
+  const TrackChain& chain() const;
+  const std::vector<PairAlignment>& pairs() const;
   /// For people: what failed, what came between.
   std::string remark() const;
 

@@ -49,7 +49,7 @@ struct FrameSource::Impl {
       valid = field;
     }
     shutter.emplace(lens, original, observations.row_time_s());
-    if (options.devignette) estimate_gain();
+    if (options.devignette && observations.size() > 0) estimate_gain();
   }
 
   cv::Mat move(const cv::Mat& image) const {
@@ -122,6 +122,9 @@ FrameSource::FrameSource(const Observations& observations, const PreprocessOptio
     : impl_(std::make_unique<Impl>(observations, options)) {}
 FrameSource::~FrameSource() = default;
 
+void FrameSource::append(const cv::Mat& bgr, double time_s) {
+  impl_->observations.append(bgr, time_s);
+}
 int FrameSource::size() const { return impl_->observations.size(); }
 const Lens& FrameSource::lens() const { return impl_->lens; }
 const Observations& FrameSource::observations() const { return impl_->observations; }

@@ -28,11 +28,15 @@ std::vector<int> vignetting_frames(int size);
 
 /// Reads and preprocesses frames on demand (memory does not grow with their number; a small cache
 /// holds the latest). Calls are thread-safe. De-vignetting: the profile is estimated once, from
-/// frames spread over the sequence.
+/// frames spread over the sequence; without frames there is none.
 class FrameSource {
  public:
   FrameSource(const Observations& observations, const PreprocessOptions& options);
   ~FrameSource();
+
+  /// One frame more, of observations that are being recorded (Observations::append). Not while
+  /// other calls run.
+  void append(const cv::Mat& bgr, double time_s);
 
   int size() const;
   /// The lens of the preprocessed frames: the observations' lens without distortion (as it is when

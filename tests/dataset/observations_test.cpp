@@ -143,6 +143,39 @@ TEST(Observations, LightsAreTheFilesThatSaysWhereTheyAre) {
   EXPECT_EQ(lights[0].intensity, beside.intensity);
 }
 
+// What is recorded frame by frame reads back as it was given, also by others while it grows.
+TEST(Observations, RecordedFramesAreObservations) {
+  const TemporaryFolder folder("obs_record");
+  const fs::path root = folder.path() / "live";
+  const Calibration calibration{PlaneWorld().camera.lens, 250.0, {}};  // 48 rows: 12 ms
+  Observations live = Observations::record(root, calibration);
+  EXPECT_EQ(live.size(), 0);
+  const cv::Mat first(48, 64, CV_8UC3, cv::Scalar(1, 2, 3)), second = 2 * first;
+  live.append(first, 0.5);
+  live.append(second, 0.75);
+  const Observations read = Observations::open(root);
+  EXPECT_EQ(read.times_s(), (std::vector<double>{0.5, 0.75}));
+  EXPECT_EQ(read.name(), "live");
+  EXPECT_DOUBLE_EQ(read.row_time_s(), 250e-6);
+  EXPECT_EQ(read.lens().fx, calibration.lens.fx);
+  for (const Observations& each : {live, read}) {
+    EXPECT_EQ(cv::norm(each.image(0), first, cv::NORM_INF), 0.0);
+    EXPECT_EQ(cv::norm(each.image(1), second, cv::NORM_INF), 0.0);
+  }
+  EXPECT_EQ(
+      error_of([&] { live.append(first, 0.76); }),
+      root.string() + ": row_time_us is 250, 48 rows take 0.012 s, but frames are 0.01 s apart");
+  EXPECT_EQ(error_of([&] { live.append(first, std::nan("")); }),
+            root.string() + ": frame 2 is at nan s, expected after 0.75 s");
+  EXPECT_EQ(error_of([&] { live.append(cv::Mat(48, 64, CV_8U), 1.0); }),
+            root.string() + ": frame 2 is 64 x 48 px of type 0, expected 64 x 48 px, 8-bit BGR");
+  EXPECT_EQ(live.size(), 2);
+  EXPECT_EQ(error_of([&] { Observations::record(root, calibration); }),
+            root.string() + ": has frames already, expected a folder to record into");
+  Observations opened = read;
+  EXPECT_EQ(error_of([&] { opened.append(first, 1.0); }), "live: is not being recorded");
+}
+
 TEST(Observations, WhatIsMissingIsNamed) {
   const TemporaryFolder folder("obs_errors");
   const auto calibration = write_calibration(folder.path());
