@@ -49,5 +49,6 @@ py::array to_array(const cv::Mat& image);
 void bind_cameras(py::module_& module);
 void bind_datasets(py::module_& module);
 void bind_metrics(py::module_& module);
+void bind_reconstruction(py::module_& module);
 
 }  // namespace rugae::python

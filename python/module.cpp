@@ -1,4 +1,5 @@
-// The Python module `rugae`: lenses, datasets and estimates as numpy arrays, and the metrics.
+// The Python module `rugae`: lenses, datasets and estimates as numpy arrays, the metrics, and live
+// reconstruction.
 #include "core/check.h"
 #include "python/arrays.h"
 
@@ -10,4 +11,5 @@ PYBIND11_MODULE(rugae, module) {
   rugae::python::bind_cameras(module);
   rugae::python::bind_datasets(module);
   rugae::python::bind_metrics(module);
+  rugae::python::bind_reconstruction(module);
 }

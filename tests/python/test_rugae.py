@@ -21,6 +21,36 @@ def pixel_grid(lens):
     return np.stack([x.ravel(), y.ravel()], axis=1)
 
 
+class WavyWall:
+    """A mottled wall in waves before a pinhole camera that looks along z."""
+    WIDTH, HEIGHT, FOCAL_PX = 320, 240, 220.0
+
+    def __init__(self):
+        random = np.random.default_rng(1)
+        noise = np.fft.fft2(random.standard_normal((512, 512)))
+        f = np.hypot(*np.meshgrid(np.fft.fftfreq(512), np.fft.fftfreq(512)))
+        mottle = np.fft.ifft2(noise * np.exp(-(f / 0.06) ** 2)).real
+        self.texture = 128 + 40 * mottle / mottle.std()  # 5 texels a mm, repeated
+
+    def calibration(self):
+        return (f"model: brown_conrady\nwidth: {self.WIDTH}\nheight: {self.HEIGHT}\nfx: {self.FOCAL_PX}\n"
+                f"fy: {self.FOCAL_PX}\ncx: {self.WIDTH / 2}\ncy: {self.HEIGHT / 2}\n")
+
+    def picture(self, centre_mm):
+        x, y = np.meshgrid(np.arange(self.WIDTH) + 0.5, np.arange(self.HEIGHT) + 0.5)
+        ray = np.stack([(x - self.WIDTH / 2) / self.FOCAL_PX, (y - self.HEIGHT / 2) / self.FOCAL_PX])
+        depth = np.full(x.shape, 30.0)
+        for _ in range(30):  # where the ray meets the wall
+            at = centre_mm[:2, None, None] + ray * depth
+            depth = 30 + 3 * np.sin(at[0] / 5) * np.cos(at[1] / 5) - centre_mm[2]
+        whole = np.floor(5 * at)
+        (u, v), (fu, fv) = whole.astype(int) % 512, 5 * at - whole
+        t, s = self.texture, (u + 1) % 512
+        w = (v + 1) % 512
+        gray = (1 - fv) * ((1 - fu) * t[v, u] + fu * t[v, s]) + fv * ((1 - fu) * t[w, u] + fu * t[w, s])
+        return np.repeat(np.clip(gray, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
 class RugaeTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -134,6 +164,41 @@ class RugaeTest(unittest.TestCase):
         self.assertAlmostEqual(scale, 2.0, places=9)
         np.testing.assert_allclose(scale * source @ rotation.T + translation, target, rtol=0, atol=1e-9)
         self.assertIsNone(rugae.umeyama(source[:2], target[:2]))
+
+    def test_live_reconstruction(self):
+        camera = WavyWall()
+        folder = os.path.join(self.folder.name, "live")
+        lens = os.path.join(self.folder.name, "lens.yaml")
+        with open(lens, "w") as file:
+            file.write(camera.calibration())
+        live = rugae.Reconstruction(folder, lens)
+        estimated, true = [], []
+        for i in range(16):
+            centre = np.array([1.2 * i, 0.3 * i, 0.2 * i])
+            live.add(camera.picture(centre), i / 30.0)
+            pose = live.pose()
+            if pose is not None:
+                estimated.append(pose[:3, 3])
+                true.append(centre)
+        self.assertEqual(len(live), 16)
+        self.assertGreaterEqual(len(true), 11)
+        estimated, true = np.array(estimated), np.array(true)
+        # The path is a line, along which rotation is not determined: distances alone.
+        distances = np.linalg.norm(estimated - estimated[0], axis=1), np.linalg.norm(true - true[0], axis=1)
+        scale = distances[0] @ distances[1] / (distances[0] @ distances[0])
+        np.testing.assert_allclose(scale * distances[0], distances[1], rtol=0, atol=0.02 * distances[1][-1])
+        self.assertGreater(len(live.points()), 100)
+        vertices, triangles = live.map()
+        self.assertGreater(len(triangles), 100)
+        self.assertLess(triangles.max(), len(vertices))
+        with self.assertRaisesRegex(rugae.Error, "expected after"):
+            live.add(camera.picture(np.zeros(3)), 0.0)
+        with self.assertRaisesRegex(ValueError, "shape"):
+            live.add(np.zeros((4, 4), np.uint8), 9.0)
+        estimate = live.finish(os.path.join(self.folder.name, "live-estimate"))
+        self.assertEqual((len(estimate), estimate.states.count("lost")), (16, 0))
+        with self.assertRaisesRegex(rugae.Error, "was finished"):
+            live.pose()
 
     def test_evaluate(self):
         metrics = rugae.evaluate(self.dataset_path, self.estimate_path)
