@@ -46,10 +46,12 @@ void Progress::begin(std::string stage, std::size_t total) {
   total_ = total;
   start_ = drawn_ = Clock::now();
   open_ = true;
+  if (watcher_) watcher_(stage_, done_, total_);
 }
 
 void Progress::step(std::size_t steps) {
   done_ += steps;
+  if (watcher_) watcher_(stage_, done_, total_);
   if (interrupted) throw Interrupted("stopped on request; the same command goes on from here");
   constexpr std::chrono::milliseconds kRedraw{100};
   if (terminal_ && !silent_ && Clock::now() - drawn_ > kRedraw) {
@@ -61,6 +63,7 @@ void Progress::step(std::size_t steps) {
 void Progress::end(const std::string& remark) {
   if (!open_) return;
   open_ = false;
+  if (watcher_) watcher_(stage_, done_, total_);
   const std::chrono::duration<double> seconds = Clock::now() - start_;
   stages_.push_back({stage_, seconds.count(), peak_rss_mb()});
   if (!silent_) draw(true, remark);

@@ -4,7 +4,9 @@
 
 #include <chrono>
 #include <cstddef>
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace rugae {
@@ -37,6 +39,11 @@ class Progress {
   /// A line of its own, without ending the stage.
   void say(const std::string& line);
 
+  /// Called at each begin, step and end of a stage, with what is done of `total` steps.
+  using Watcher =
+      std::function<void(const std::string& stage, std::size_t done, std::size_t total)>;
+  void watch(Watcher watcher) { watcher_ = std::move(watcher); }
+
   const std::vector<StageTime>& stages() const { return stages_; }
 
   /// Makes Ctrl-C set a flag that step() turns into Interrupted; the second Ctrl-C ends the process
@@ -54,6 +61,7 @@ class Progress {
   std::size_t done_ = 0, total_ = 0;
   Clock::time_point start_, drawn_;
   std::vector<StageTime> stages_;
+  Watcher watcher_;
 };
 
 }  // namespace rugae

@@ -6,17 +6,14 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "core/files.h"
 #include "core/units.h"
 #include "dataset/colours.h"
-#include "dataset/image_io.h"
 #include "recon/flow.h"
 #include "recon/keyframes.h"
 #include "recon/preprocess/reflections.h"
 #include "recon/spread.h"
 
 namespace rugae {
-namespace fs = std::filesystem;
 namespace {
 
 constexpr int kSubpixelBits = 4;  // of OpenCV's drawing: sixteenths of a pixel
@@ -42,11 +39,6 @@ cv::Scalar ramp(double share) {
   return {static_cast<double>(c[0]), static_cast<double>(c[1]), static_cast<double>(c[2])};
 }
 
-fs::path stage(const fs::path& folder, const std::string& name) {
-  make_folder(folder / name);
-  return folder / name;
-}
-
 // Between the 2nd and the 98th percentile, so that one far corner does not take all colours.
 cv::Mat relief_picture(const cv::Mat& depth) {
   const double low = quantile(depth, 0.02), high = quantile(depth, 0.98);
@@ -61,31 +53,36 @@ cv::Mat gray_as_bgr(const cv::Mat& gray) {
   return bgr;
 }
 
+cv::Mat with_points(const cv::Mat& gray, const std::vector<FollowedPoint>& points) {
+  constexpr double kLongTrack = 12.0;  // key frames: drawn red
+  cv::Mat drawn = gray_as_bgr(gray);
+  for (const FollowedPoint& point : points)
+    cv::circle(drawn, drawn_at(point.pixel), 2 << kSubpixelBits,
+               ramp(static_cast<double>(point.keyframes) / kLongTrack), -1, cv::LINE_AA,
+               kSubpixelBits);
+  return drawn;
+}
+
 }  // namespace
 
-void draw_preprocess(const fs::path& folder, const FrameSource& frames,
+void draw_preprocess(const PictureSink& sink, const FrameSource& frames,
                      const std::vector<int>& indices, const PreprocessOptions& options) {
-  const fs::path original = stage(folder, "original"), mask = stage(folder, "mask"),
-                 inpainted = stage(folder, "inpainted"), final = stage(folder, "preprocessed"),
-                 pose = stage(folder, "pose");
   for (const int index : indices) {
     const cv::Mat bgr = frames.observations().image(index);
     cv::Mat gray;
     cv::cvtColor(bgr, gray, cv::COLOR_BGR2GRAY);
     const cv::Mat reflection = detect_reflections(gray, options.reflections, frames.field());
     const Frame frame = frames.frame(index);
-    write_image(original / name_of(index), bgr);
-    write_image(mask / name_of(index), reflection);
-    write_image(inpainted / name_of(index),
-                suppress_reflections(bgr, reflection, options.reflections));
-    write_image(final / name_of(index), frame.map_bgr);
-    write_image(pose / name_of(index), frame.gray);
+    sink("original/" + name_of(index), bgr);
+    sink("mask/" + name_of(index), reflection);
+    sink("inpainted/" + name_of(index), suppress_reflections(bgr, reflection, options.reflections));
+    sink("preprocessed/" + name_of(index), frame.map_bgr);
+    sink("pose/" + name_of(index), frame.gray);
   }
 }
 
-void draw_pairs(const fs::path& folder, const FrameSource& frames,
+void draw_pairs(const PictureSink& sink, const FrameSource& frames,
                 const std::vector<PairAlignment>& pairs) {
-  const fs::path flow_folder = stage(folder, "flow"), inlier_folder = stage(folder, "inliers");
   for (const PairAlignment& pair : pairs) {
     if (pair.reference_px.empty()) continue;
     const std::string name = fmt::format("{:06}-{:06}.png", pair.reference, pair.moving);
@@ -96,7 +93,7 @@ void draw_pairs(const fs::path& folder, const FrameSource& frames,
       lengths.push_back((pair.moving_px[i] - pair.reference_px[i]).norm());
     double max_px = 1.0;
     for (const double length : lengths) max_px = std::max(max_px, length);
-    write_image(flow_folder / name, flow_picture(flow, max_px));
+    sink("flow/" + name, flow_picture(flow, max_px));
     cv::Mat drawn = gray_as_bgr(reference);
     for (std::size_t i = 0; i < lengths.size(); ++i) {
       cv::line(drawn, drawn_at(pair.reference_px[i]), drawn_at(pair.moving_px[i]),
@@ -104,29 +101,28 @@ void draw_pairs(const fs::path& folder, const FrameSource& frames,
       cv::circle(drawn, drawn_at(pair.reference_px[i]), 1 << kSubpixelBits, {255, 255, 255}, -1,
                  cv::LINE_AA, kSubpixelBits);
     }
-    write_image(inlier_folder / name, drawn);
+    sink("inliers/" + name, drawn);
   }
 }
 
-void draw_tracks(const fs::path& folder, const FrameSource& frames, const Structure& structure,
+void draw_followed(const PictureSink& sink, const cv::Mat& gray, int frame,
+                   const std::vector<FollowedPoint>& points) {
+  sink("followed/" + name_of(frame), with_points(gray, points));
+}
+
+void draw_tracks(const PictureSink& sink, const FrameSource& frames, const Structure& structure,
                  const std::vector<int>& keyframes) {
-  constexpr double kLongTrack = 12.0;  // key frames: drawn red
-  const fs::path to = stage(folder, "tracks");
   for (const int k : keyframes) {
-    cv::Mat drawn = gray_as_bgr(frames.gray(structure.frames[k]));
-    for (const Track& track : structure.tracks) {
-      for (const auto& o : track.observations) {
-        if (o.keyframe != k) continue;
-        cv::circle(drawn, drawn_at(o.pixel), 2 << kSubpixelBits,
-                   ramp(static_cast<double>(track.observations.size()) / kLongTrack), -1,
-                   cv::LINE_AA, kSubpixelBits);
-      }
-    }
-    write_image(to / name_of(structure.frames[k]), drawn);
+    std::vector<FollowedPoint> points;
+    for (const Track& track : structure.tracks)
+      for (const auto& o : track.observations)
+        if (o.keyframe == k) points.push_back({o.pixel, track.observations.size()});
+    const int frame = structure.frames[k];
+    sink("tracks/" + name_of(frame), with_points(frames.gray(frame), points));
   }
 }
 
-void draw_links(const fs::path& folder, const Structure& structure) {
+void draw_links(const PictureSink& sink, const Structure& structure) {
   constexpr int kMostPx = 1000;  // of the picture: of more key frames each pixel is several
   constexpr double kMany = 500;  // shared points: the brightest
   const auto n = static_cast<int>(structure.frames.size());
@@ -144,40 +140,36 @@ void draw_links(const fs::path& folder, const Structure& structure) {
   cv::applyColorMap(gray, drawn, cv::COLORMAP_INFERNO);
   const int enlarged = std::max(1, kMostPx / side);
   cv::resize(drawn, drawn, {}, enlarged, enlarged, cv::INTER_NEAREST);
-  write_image(stage(folder, "links") / "keyframes.png", drawn);
+  sink("links/keyframes.png", drawn);
 }
 
-void draw_depth_maps(const fs::path& folder, const std::vector<DepthExample>& examples,
+void draw_depth_maps(const PictureSink& sink, const std::vector<DepthExample>& examples,
                      double max_sigma_share) {
-  const fs::path wide = stage(folder, "wide"), found = stage(folder, "stereo"),
-                 agreed = stage(folder, "agreed"), sigma = stage(folder, "sigma");
   for (const DepthExample& example : examples) {
     const std::string name = name_of(example.frame);
     const double low = quantile(example.found, 0.02), high = quantile(example.found, 0.98);
-    write_image(wide / name, example.picture);
-    write_image(found / name, depth_picture(example.found, low, high));
-    write_image(agreed / name, depth_picture(example.agreed, low, high));
-    write_image(sigma / name,
-                depth_picture(cv::Mat(example.sigma / example.agreed), 0.0, max_sigma_share));
+    sink("wide/" + name, example.picture);
+    sink("stereo/" + name, depth_picture(example.found, low, high));
+    sink("agreed/" + name, depth_picture(example.agreed, low, high));
+    sink("sigma/" + name,
+         depth_picture(cv::Mat(example.sigma / example.agreed), 0.0, max_sigma_share));
   }
 }
 
-void draw_mosaics(const fs::path& folder, const std::vector<Mosaic>& mosaics,
+void draw_mosaics(const PictureSink& sink, const std::vector<Mosaic>& mosaics,
                   const std::vector<std::optional<MosaicDepth>>& depths, std::size_t at_most) {
-  const fs::path mosaic_folder = stage(folder, "mosaic"), seam_folder = stage(folder, "seams"),
-                 depth_folder = stage(folder, "depth");
   for (const int m : spread(static_cast<int>(mosaics.size()), static_cast<int>(at_most))) {
     const Mosaic& mosaic = mosaics[m];
     const std::string name = fmt::format("{:03}.png", m);
-    write_image(mosaic_folder / name, mosaic.bgr);
+    sink("mosaic/" + name, mosaic.bgr);
     cv::Mat drawn = mosaic.bgr.clone();
     for (int y = 1; y < drawn.rows; ++y)
       for (int x = 1; x < drawn.cols; ++x)
         if (mosaic.seams.at<int>(y, x) != mosaic.seams.at<int>(y, x - 1) ||
             mosaic.seams.at<int>(y, x) != mosaic.seams.at<int>(y - 1, x))
           drawn.at<cv::Vec3b>(y, x) = {0, 255, 255};
-    write_image(seam_folder / name, drawn);
-    if (depths[m]) write_image(depth_folder / name, relief_picture(depths[m]->depth));
+    sink("seams/" + name, drawn);
+    if (depths[m]) sink("depth/" + name, relief_picture(depths[m]->depth));
   }
 }
 

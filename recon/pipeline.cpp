@@ -124,7 +124,8 @@ MadeMap make_map(const FrameSource& frames, const Structure& structure,
 }
 
 Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconOptions& options,
-                   const std::filesystem::path& out, const Stages& stages, Progress& progress) {
+                   const std::filesystem::path& out, const Stages& stages, Progress& progress,
+                   Listener* listener) {
   const EstimateLayout layout{out};
   make_folder(out);
   progress.end();
@@ -142,16 +143,21 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
   write_depth(layout, estimate.map, structure, motions, frames.shutter(), progress);
   if (options.pictures) {
     progress.begin("pictures");
-    draw_preprocess(layout.pictures(), frames, spread(frames.size(), kPictures),
-                    options.preprocess);
-    draw_pairs(layout.pictures(), frames, motion.pairs);
-    draw_tracks(layout.pictures(), frames, structure,
+    const PictureSink sink = [&](const std::string& name, const cv::Mat& image) {
+      const std::filesystem::path file = layout.pictures() / name;
+      make_folder(file.parent_path());
+      write_image(file, image);
+      if (listener != nullptr) listener->picture(name, image);
+    };
+    draw_preprocess(sink, frames, spread(frames.size(), kPictures), options.preprocess);
+    draw_pairs(sink, frames, motion.pairs);
+    draw_tracks(sink, frames, structure,
                 spread(static_cast<int>(structure.frames.size()), kPictures));
-    draw_links(layout.pictures(), structure);
+    draw_links(sink, structure);
     if (options.method == "dense")
-      draw_depth_maps(layout.pictures(), made.examples, options.dense.max_sigma_share);
+      draw_depth_maps(sink, made.examples, options.dense.max_sigma_share);
     else
-      draw_mosaics(layout.pictures(), made.mosaics, made.depths, 2 * kPictures);
+      draw_mosaics(sink, made.mosaics, made.depths, 2 * kPictures);
   }
   progress.end();
   estimate.stages = motion.stages;

@@ -10,6 +10,7 @@
 #include "dataset/estimate.h"
 #include "dataset/observations.h"
 #include "recon/dense/dense_map.h"
+#include "recon/listener.h"
 #include "recon/map.h"
 #include "recon/mosaic.h"
 #include "recon/motion.h"
@@ -38,8 +39,10 @@ MadeMap make_map(const FrameSource& frames, const Structure& structure,
                  const Stages& stages, Progress& progress);
 
 /// The second half alone, with a motion from estimate_motion(), perhaps of an earlier run: mosaics,
-/// shape from shading, map, depth and pictures. `frames` are preprocessed as `options` say.
+/// shape from shading, map, depth and pictures, which go to the listener as well. `frames` are
+/// preprocessed as `options` say.
 Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconOptions& options,
-                   const std::filesystem::path& out, const Stages& stages, Progress& progress);
+                   const std::filesystem::path& out, const Stages& stages, Progress& progress,
+                   Listener* listener = nullptr);
 
 }  // namespace rugae

@@ -2,6 +2,7 @@
 
 #include "core/check.h"
 #include "core/files.h"
+#include "recon/pictures.h"
 #include "recon/pipeline.h"
 
 namespace rugae {
@@ -24,6 +25,23 @@ class Timer {
   using Clock = std::chrono::steady_clock;
   StageTime& stage_;
   Clock::time_point start_ = Clock::now();
+};
+
+// A listener hears of progress as long as this lives.
+class Watched {
+ public:
+  Watched(Progress& progress, Listener* listener) : progress_(progress) {
+    if (listener == nullptr) return;
+    progress.watch([listener](const std::string& stage, std::size_t done, std::size_t total) {
+      listener->progress(stage, done, total);
+    });
+  }
+  ~Watched() { progress_.watch({}); }
+  Watched(const Watched&) = delete;
+  Watched& operator=(const Watched&) = delete;
+
+ private:
+  Progress& progress_;
 };
 
 }  // namespace
@@ -76,9 +94,30 @@ void Reconstruction::follow_what_came() {
     selector_->advance(added_);
     looked_at_ = added_;
   }
-  const Timer timer(following_);
-  const std::vector<int>& chosen = selector_->keyframes().frames;
-  for (; followed_ < chosen.size(); ++followed_) follower_->add(chosen[followed_]);
+  {
+    const Timer timer(following_);
+    const std::vector<int>& chosen = selector_->keyframes().frames;
+    for (; followed_ < chosen.size(); ++followed_) follower_->add(chosen[followed_]);
+  }
+  show_what_was_followed();
+}
+
+// The last key frame is not shown yet: nothing was followed from it, and more may lead into it.
+void Reconstruction::show_what_was_followed() {
+  if (listener_ == nullptr) return;
+  const std::vector<int> settled = follower_->settled();
+  for (; shown_ + 1 < settled.size(); ++shown_) {
+    const int frame = settled[shown_];
+    std::vector<FollowedPoint> points;
+    for (const int t : follower_->chain().through(frame)) {
+      const Track& track = follower_->chain().tracks()[static_cast<std::size_t>(t)];
+      for (const auto& o : track.observations)
+        if (o.keyframe == frame) points.push_back({o.pixel, track.observations.size()});
+    }
+    draw_followed(
+        [&](const std::string& name, const cv::Mat& image) { listener_->picture(name, image); },
+        frames_->gray(frame), frame, points);
+  }
 }
 
 LivePath& Reconstruction::live() {
@@ -116,6 +155,7 @@ Estimate Reconstruction::finish(const std::filesystem::path& out, Progress& prog
   live_.reset();
   selector_.reset();
   follower_.reset();
+  const Watched watched(progress, listener_);
   const Stages stages;
   const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());
   if (!recorded_) {
@@ -126,7 +166,7 @@ Estimate Reconstruction::finish(const std::filesystem::path& out, Progress& prog
   motion.stages = {preprocessing_, selecting_, following_};
   motion.stages.insert(motion.stages.end(), progress.stages().begin() + earlier,
                        progress.stages().end());
-  return build_map(*frames_, motion, options_, out, stages, progress);
+  return build_map(*frames_, motion, options_, out, stages, progress, listener_);
 }
 
 }  // namespace rugae

@@ -11,6 +11,7 @@
 #include "dataset/estimate.h"
 #include "dataset/observations.h"
 #include "recon/keyframes.h"
+#include "recon/listener.h"
 #include "recon/live_path.h"
 #include "recon/options.h"
 #include "recon/preprocess/preprocess.h"
@@ -31,6 +32,9 @@ class Reconstruction {
   Reconstruction(const std::filesystem::path& folder, const Calibration& calibration,
                  const ReconOptions& options);
   ~Reconstruction();
+
+  /// From now on; it must outlive this, or nullptr follows.
+  void listen(Listener* listener) { listener_ = listener; }
 
   /// The next recorded frame. Throws Error when there is none.
   void add();
@@ -55,6 +59,7 @@ class Reconstruction {
   using Clock = std::chrono::steady_clock;
   void begin();
   void follow_what_came();
+  void show_what_was_followed();
   LivePath& live();
 
   ReconOptions options_;
@@ -63,8 +68,9 @@ class Reconstruction {
   std::unique_ptr<KeyframeSelector> selector_;
   std::unique_ptr<TrackFollower> follower_;
   std::unique_ptr<LivePath> live_;  // from the first question on
-  std::size_t followed_ = 0;        // key frames handed to the follower
-  int added_ = 0, looked_at_ = 0;   // frames
+  Listener* listener_ = nullptr;
+  std::size_t followed_ = 0, shown_ = 0;  // key frames handed to the follower, to the listener
+  int added_ = 0, looked_at_ = 0;         // frames
   StageTime preprocessing_{"preprocessing"}, selecting_{"key frames"},
       following_{"pairwise alignment"};
 };

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <set>
+
 #include "core/check.h"
 #include "core/files.h"
 #include "core/mesh.h"
@@ -117,6 +119,46 @@ TEST_P(FramesOneAtATime, PosesWhileTheyCome) {
   }
   EXPECT_TRUE(synthetic::path_error(now, truth_).rmse <= kLiveShare * error.path_extent);
   EXPECT_TRUE(synthetic::path_error(then, truth_).rmse <= kLiveShare * error.path_extent);
+}
+
+// Who looks on sees every key frame once, each stage from none to all of its steps, and the
+// pictures that are written.
+TEST_P(FramesOneAtATime, AListenerSeesProgressAndPictures) {
+  struct Seen : Listener {
+    void progress(const std::string& stage, std::size_t done, std::size_t total) override {
+      if (stages.empty() || stages.back() != stage) stages.push_back(stage);
+      EXPECT_TRUE(total == 0 || done <= total) << stage << done << " " << total;
+    }
+    void picture(const std::string& name, const cv::Mat& image) override {
+      EXPECT_EQ(image.depth(), CV_8U);
+      EXPECT_FALSE(image.empty());
+      EXPECT_TRUE(names.insert(name).second) << name;
+    }
+    std::vector<std::string> stages;
+    std::set<std::string> names;
+  } seen;
+  ReconOptions with_pictures = options();
+  with_pictures.pictures = true;
+  Reconstruction live(Observations::open(recording_.images, recording_.calibration), with_pictures);
+  live.listen(&seen);
+  while (live.size() < kFrames) live.add();
+  EXPECT_TRUE(seen.names.contains("followed/000000.png"));
+  const auto followed = seen.names.size();
+  EXPECT_GT(followed, 3u);
+  const fs::path out = fresh("listened");
+  Progress progress(Progress::Output::silent);
+  live.finish(out, progress);
+  EXPECT_EQ(seen.stages.front(), "structure");
+  EXPECT_EQ(seen.stages.back(), "pictures");
+  std::size_t written = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(out / "pictures")) {
+    if (!entry.is_regular_file()) continue;
+    ++written;
+    EXPECT_TRUE(seen.names.contains(fs::relative(entry.path(), out / "pictures").string()))
+        << entry.path();
+  }
+  EXPECT_GT(written, 20u);
+  EXPECT_EQ(seen.names.size(), written + followed);
 }
 
 // The map of half the frames lies in the world of the poses.
