@@ -74,7 +74,12 @@ void Reconstruction::begin() {
                                               options_.seed, recorded_);
 }
 
+void Reconstruction::check_open() const {
+  check(selector_ != nullptr, "the reconstruction was finished");
+}
+
 void Reconstruction::add() {
+  check_open();
   check(recorded_ && added_ < frames_->size(), "frame {} of {}: no such frame", added_,
         frames_->size());
   ++added_;
@@ -82,6 +87,7 @@ void Reconstruction::add() {
 }
 
 void Reconstruction::add(const cv::Mat& bgr, double time_s) {
+  check_open();
   check(!recorded_, "a frame was added to a recorded sequence");
   frames_->append(bgr, time_s);
   ++added_;
@@ -121,7 +127,7 @@ void Reconstruction::show_what_was_followed() {
 }
 
 LivePath& Reconstruction::live() {
-  check(selector_ != nullptr, "the reconstruction was finished");
+  check_open();
   if (looked_at_ < added_) follow_what_came();
   if (!live_) live_ = std::make_unique<LivePath>(*frames_, options_);
   live_->update(*follower_);
@@ -146,7 +152,8 @@ TriangleMesh Reconstruction::map() {
 }
 
 Estimate Reconstruction::finish(const std::filesystem::path& out, Progress& progress) {
-  check(selector_ != nullptr, "the reconstruction was finished");
+  check_open();
+  progress.end();  // the caller's loop over frames: its parts have times of their own
   if (looked_at_ < added_) follow_what_came();
   Followed followed = [&] {
     const Timer timer(following_);

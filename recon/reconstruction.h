@@ -58,6 +58,7 @@ class Reconstruction {
  private:
   using Clock = std::chrono::steady_clock;
   void begin();
+  void check_open() const;
   void follow_what_came();
   void show_what_was_followed();
   LivePath& live();

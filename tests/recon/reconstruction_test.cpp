@@ -105,6 +105,7 @@ TEST_P(FramesOneAtATime, PosesWhileTheyCome) {
               sha256_of_file(root_ / "silent_estimate" / file))
         << file;
   EXPECT_THROW(live.pose(), Error);
+  EXPECT_THROW(live.add(pictures_[0], 9.0), Error);
   EXPECT_THROW(live.finish(root_ / "again", progress), Error);
 
   // What was recorded is as good as any folder.
@@ -112,6 +113,14 @@ TEST_P(FramesOneAtATime, PosesWhileTheyCome) {
   EXPECT_EQ(recorded.size(), kFrames);
   EXPECT_EQ(recorded.time_s(7), 7 / 30.0);
   const Estimate later = reconstruct(recorded, options(), root_ / "later", progress);
+  std::set<std::string> stages;  // each once: their times add up to all that it took
+  for (const StageTime& stage : later.stages) {
+    EXPECT_TRUE(stages.insert(stage.name).second || stage.name == "bundle adjustment" ||
+                stage.name == "revisits")
+        << stage.name;
+  }
+  EXPECT_TRUE(stages.contains("key frames") && stages.contains("pairwise alignment"));
+  EXPECT_FALSE(stages.contains("frames"));
   std::vector<Rigid3> now, then;
   for (int i = 0; i < kFrames; ++i) {
     now.push_back(a.world_from_camera[static_cast<std::size_t>(i)]);
