@@ -217,7 +217,7 @@ void fill_head(const std::vector<StudyPart>& parts, std::map<std::string, std::s
         all_cells(parts)[0].metrics.value("failed", "without a reason"));
   const bool many = cells.size() > 1;
   const auto first = std::ranges::find_if(
-      cells, [](const CellResult& cell) { return dataset_finished(cell.dataset); });
+      cells, [](const CellResult& c) { return fs::exists(DatasetLayout{c.dataset}.manifest()); });
   if (first == cells.end()) {  // the study keeps none
     values["cover"] = values["cards"] = "";
     values["lede"] = lede(parts, nullptr);
