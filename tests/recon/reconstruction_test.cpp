@@ -24,6 +24,8 @@ constexpr int kFrames = 24;
 constexpr double kStepRad = 0.035;  // about 0.8 mm and 2 degrees between frames
 /// Of the path's extent: what neighbours alone tie together, not adjusted to the end.
 constexpr double kLiveShare = 0.03;
+/// Of a turn by 0.8 rad, likewise.
+constexpr double kLiveTurnRad = 0.02;
 
 class FramesOneAtATime : public testing::TestWithParam<std::string> {
  protected:
@@ -94,6 +96,7 @@ TEST_P(FramesOneAtATime, PosesWhileTheyCome) {
   std::printf("%zu of %d poses, %.3f mm of %.1f mm, map of %zu triangles\n", poses.size(), kFrames,
               error.rmse, error.path_extent, half.triangles.size());
   EXPECT_TRUE(error.rmse <= kLiveShare * error.path_extent);
+  EXPECT_TRUE(error.worst_rotation_rad <= kLiveTurnRad) << error.worst_rotation_rad;
   EXPECT_FALSE(half.empty());
 
   Progress progress(Progress::Output::silent);
