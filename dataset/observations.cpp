@@ -166,7 +166,7 @@ void Observations::append(const cv::Mat& bgr, double time_s) {
   }
   const fs::path file = recording_ / "frames" / fmt::format("{:06}.png", size());
   write_image(file, bgr);
-  append_frame(recording_ / "frames.csv", size(), {time_s, 0.0, 1.0});
+  append_frame(recording_ / "frames.csv", size(), {time_s, 0.0, 1.0});  // exposure is not known
   files_.push_back(file);
   times_s_.push_back(time_s);
 }

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
-#include "recon/resection.h"
-
 namespace rugae {
 
 LivePath::LivePath(const FrameSource& frames, const ReconOptions& options)
-    : frames_(frames), options_(options), growth_(structure_, frames.lens().fx, options.bundle) {}
+    : frames_(frames),
+      growth_(structure_, frames.lens().fx, options.bundle),
+      resector_(frames, options.align, options.bundle, options.seed) {}
 
 // What was followed into the key frame, or began in it, since it was asked last.
 void LivePath::take(const TrackChain& chain, int keyframe) {
@@ -50,7 +50,7 @@ std::optional<Rigid3> LivePath::place(int frame) const {
     const auto k = static_cast<std::size_t>(key - structure_.frames.begin());
     if (structure_.placed[k]) return structure_.cam_from_world[k];
   }
-  return resect_frame(frames_, structure_, frame, options_.align, options_.bundle, options_.seed);
+  return resector_.place(structure_, frame);
 }
 
 }  // namespace rugae

@@ -7,6 +7,7 @@
 #include "recon/growth.h"
 #include "recon/options.h"
 #include "recon/preprocess/preprocess.h"
+#include "recon/resection.h"
 #include "recon/tracks.h"
 
 namespace rugae {
@@ -27,9 +28,9 @@ class LivePath {
   void take(const TrackChain& chain, int keyframe);
 
   const FrameSource& frames_;
-  ReconOptions options_;
   Structure structure_;
   SegmentGrowth growth_;
+  Resector resector_;
   std::vector<std::size_t>
       taken_;  // of each key frame: how many of its tracks are in the structure
   bool begun_ = false;

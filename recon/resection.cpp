@@ -46,7 +46,18 @@ std::vector<Seen> at_most(std::size_t count, const std::vector<Seen>& points) {
   return chosen;
 }
 
-// The triangulated points of each key frame, at most kMaxPoints of each.
+// The triangulated points of a key frame, at most kMaxPoints.
+std::vector<Seen> points_seen_by(const Structure& structure, int keyframe) {
+  std::vector<Seen> seen;
+  for (const Track& track : structure.tracks) {
+    if (!track.triangulated) continue;
+    for (const auto& o : track.observations)
+      if (o.keyframe == keyframe && o.inlier) seen.push_back({track.point, o.pixel});
+  }
+  return at_most(kMaxPoints, seen);
+}
+
+// Of each key frame, in one pass.
 std::vector<std::vector<Seen>> points_seen(const Structure& structure) {
   std::vector<std::vector<Seen>> seen(structure.frames.size());
   for (const Track& track : structure.tracks) {
@@ -142,32 +153,54 @@ std::optional<Placement> place_by_points(const std::vector<Vec3>& points,
   return placement;
 }
 
-std::optional<Rigid3> resect_frame(const FrameSource& frames, const Structure& structure, int frame,
-                                   const AlignOptions& align_options, const BundleOptions& options,
-                                   std::uint64_t seed) {
+struct Resector::Impl {
+  using Shared = std::shared_ptr<const AlignImage>;
+  const FrameSource& frames;
+  AlignOptions align_options;
+  BundleOptions options;
+  std::uint64_t seed;
+  AlignField field;
+  // No point starts in the frame to be placed: its reflections need not be known.
+  cv::Mat no_reflections;
+  Cache<Shared> references{kReferencesHeld};
+
+  Shared reference(int frame) {
+    return references.get(frame, [&] {
+      return std::make_shared<const AlignImage>(prepare_alignment(frames.pose_frame(frame), field));
+    });
+  }
+
+  // The nearer key frame is asked first.
+  template <typename PointsOf>
+  std::optional<Rigid3> place(const Structure& structure, const std::vector<int>& placed, int frame,
+                              const PointsOf& points_of) {
+    const AlignImage moving =
+        prepare_alignment({frame, frames.gray(frame), {}, no_reflections, frames.valid()}, field);
+    const Between around = between(structure, placed, frame);
+    for (const int k : around.keyframes) {
+      const std::vector<Seen>& points = points_of(k);
+      if (static_cast<int>(points.size()) < kMinPoints) continue;
+      const Sighted sighted = follow(frames.lens(), points, *reference(structure.frames[k]), moving,
+                                     around.cam_from_world, align_options, seed);
+      const auto found = place_by_points(sighted.points, sighted.rays, frames.lens().fx, options);
+      if (found) return found->cam_from_world;
+    }
+    return std::nullopt;
+  }
+};
+
+Resector::Resector(const FrameSource& frames, const AlignOptions& align_options,
+                   const BundleOptions& options, std::uint64_t seed)
+    : impl_(new Impl{frames, align_options, options, seed,
+                     prepare_field(frames.valid(), align_options),
+                     cv::Mat::zeros(frames.valid().size(), CV_8U)}) {}
+Resector::~Resector() = default;
+
+std::optional<Rigid3> Resector::place(const Structure& structure, int frame) const {
   const std::vector<int> placed = placed_keyframes(structure);
   if (placed.empty()) return std::nullopt;
-  const AlignField field = prepare_field(frames.valid(), align_options);
-  const cv::Mat none = cv::Mat::zeros(frames.valid().size(), CV_8U);
-  const AlignImage moving =
-      prepare_alignment({frame, frames.gray(frame), {}, none, frames.valid()}, field);
-  const Between around = between(structure, placed, frame);
-  for (const int k : around.keyframes) {
-    std::vector<Seen> points;
-    for (const Track& track : structure.tracks) {
-      if (!track.triangulated) continue;
-      for (const auto& o : track.observations)
-        if (o.keyframe == k && o.inlier) points.push_back({track.point, o.pixel});
-    }
-    points = at_most(kMaxPoints, points);
-    if (static_cast<int>(points.size()) < kMinPoints) continue;
-    const AlignImage reference = prepare_alignment(frames.pose_frame(structure.frames[k]), field);
-    const Sighted sighted = follow(frames.lens(), points, reference, moving, around.cam_from_world,
-                                   align_options, seed);
-    if (const auto found = place_by_points(sighted.points, sighted.rays, frames.lens().fx, options))
-      return found->cam_from_world;
-  }
-  return std::nullopt;
+  return impl_->place(structure, placed, frame,
+                      [&](int k) { return points_seen_by(structure, k); });
 }
 
 std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
@@ -183,38 +216,13 @@ std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
     progress.end("nothing to place frames in");
     return poses;
   }
-  const double focal_px = frames.lens().fx;
   const std::vector<std::vector<Seen>> seen = points_seen(structure);
-  using Shared = std::shared_ptr<const AlignImage>;
-  Cache<Shared> references(kReferencesHeld);
-  const AlignField field = prepare_field(frames.valid(), align_options);
-  const auto reference_at = [&](int frame) {
-    return std::make_shared<const AlignImage>(prepare_alignment(frames.pose_frame(frame), field));
-  };
-  // No point starts in the frame to be placed: its reflections need not be known.
-  const cv::Mat none = cv::Mat::zeros(frames.valid().size(), CV_8U);
-  const auto moving_at = [&](int frame) {
-    return prepare_alignment({frame, frames.gray(frame), {}, none, frames.valid()}, field);
-  };
+  const Resector resector(frames, align_options, options, seed);
   for (std::size_t begin = 0; begin < rest.size(); begin += kFramesAtOnce) {
     const std::size_t end = std::min(rest.size(), begin + kFramesAtOnce);
     tbb::parallel_for(begin, end, [&](std::size_t i) {
-      const int f = rest[i];
-      const AlignImage moving = moving_at(f);
-      // The nearer key frame is asked first.
-      const Between around = between(structure, placed, f);
-      for (const int k : around.keyframes) {
-        const std::vector<Seen>& points = seen[k];
-        if (static_cast<int>(points.size()) < kMinPoints) continue;
-        const int key = structure.frames[k];
-        const Shared reference = references.get(key, [&] { return reference_at(key); });
-        const Sighted sighted = follow(frames.lens(), points, *reference, moving,
-                                       around.cam_from_world, align_options, seed);
-        const auto p = place_by_points(sighted.points, sighted.rays, focal_px, options);
-        if (!p) continue;
-        poses[f] = p->cam_from_world;
-        break;
-      }
+      poses[rest[i]] = resector.impl_->place(
+          structure, placed, rest[i], [&](int k) -> const auto& { return seen[k]; });
     });
     progress.step(end - begin);
   }

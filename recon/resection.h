@@ -3,6 +3,7 @@
 // other frames find their place in it.
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -28,11 +29,24 @@ std::optional<Placement> place_by_points(const std::vector<Vec3>& points,
                                          const std::vector<Vec2>& rays, double focal_px,
                                          const BundleOptions& options);
 
-/// Pose of one frame, cam_from_world: the points of the placed key frames next to it are followed
-/// into it by `align`. Empty where that fails, or where none is placed.
-std::optional<Rigid3> resect_frame(const FrameSource& frames, const Structure& structure, int frame,
-                                   const AlignOptions& align_options, const BundleOptions& options,
-                                   std::uint64_t seed);
+/// Places frames one by one: the points of the placed key frames next to a frame are followed into
+/// it by `align`. Key frames are prepared once for many frames.
+class Resector {
+ public:
+  Resector(const FrameSource& frames, const AlignOptions& align_options,
+           const BundleOptions& options, std::uint64_t seed);
+  ~Resector();
+
+  /// cam_from_world; empty where following fails, or where no key frame is placed.
+  std::optional<Rigid3> place(const Structure& structure, int frame) const;
+
+ private:
+  friend std::vector<std::optional<Rigid3>> resect_frames(const FrameSource&, const Structure&,
+                                                          const AlignOptions&, const BundleOptions&,
+                                                          std::uint64_t, Progress&);
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 /// Poses of all frames that are not placed key frames: the points of the nearest placed key frames
 /// before and after are followed into the frame by `align`. Empty where that fails: the frame is

@@ -37,8 +37,8 @@ struct Followed {
 /// reflections, where the flow is best determined.
 class TrackFollower {
  public:
-  /// With `ahead` the next key frame but one is prepared while the next is followed to: twice as
-  /// fast, and the same, but that the tracks are known one key frame later.
+  /// With `ahead` the next key frame but one is prepared while the next is followed to: faster,
+  /// and the same, but that the tracks are known one key frame later.
   TrackFollower(const FrameSource& frames, const AlignOptions& align_options,
                 const TrackOptions& options, std::uint64_t seed, bool ahead = true);
   ~TrackFollower();

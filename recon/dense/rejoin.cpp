@@ -13,12 +13,13 @@
 namespace rugae {
 namespace {
 
-constexpr int kLookedAt = 16;          // key frames from a break on, until one is found
-constexpr int kRings = 3;              // of turned guesses around the foretold one
-constexpr double kRingRad = 0.05;      // between them; the search for patches covers as much
-constexpr std::size_t kPatches = 600;  // looked for in a key frame: few may be found from so far
-constexpr int kPlacedAtMost = 24;      // key frames that the similarity is fitted to
+constexpr int kLookedAt = 16;      // key frames from a break on, until one is found
+constexpr int kRings = 3;          // of turned guesses around the foretold one
+constexpr double kRingRad = 0.05;  // between them; the search for patches covers as much
+constexpr int kPatches = 600;      // looked for in a key frame: few may be found from so far
+constexpr int kPlacedAtMost = 24;  // key frames that the similarity is fitted to
 constexpr int kMinPlaced = 3;
+// Poses agree as far as the search for revisits, a few degrees, covers what is left.
 constexpr double kMinAgreeing = 0.75;   // of those placed
 constexpr double kAgreeingRad = 0.1;    // orientation
 constexpr double kAgreeingShare = 0.1;  // position, of the distance of what is seen
@@ -80,9 +81,9 @@ class Finder {
     Sim3 map_from_segment = carried(first->cam_from_map, pose_of(*first), guess->scale);
     for (const int k : nearest(first->keyframe, kPlacedAtMost)) {
       if (k == first->keyframe) continue;
-      const auto pose = place(k, map_from_segment, Quat::Identity());
-      if (!pose) continue;
-      found.push_back({k, *pose});
+      const auto placed = place(image_of(k), k, map_from_segment, Quat::Identity());
+      if (!placed) continue;
+      found.push_back({k, placed->cam_from_world});
       if (found.size() >= kMinPlaced) map_from_segment = fitted(found, map_from_segment.scale);
     }
     if (found.size() < kMinPlaced) return std::nullopt;
@@ -118,13 +119,13 @@ class Finder {
     return order;
   }
 
-  std::optional<Rigid3> place(int k, const Sim3& map_from_segment, const Quat& turn) const {
-    const Frame frame = frames_.pose_frame(segment_.frames[k]);
-    return place_in(prepare_patch_image(frame), k, map_from_segment, turn, nullptr);
+  PatchImage image_of(int k) const {
+    return prepare_patch_image(frames_.pose_frame(segment_.frames[k]));
   }
 
-  std::optional<Rigid3> place_in(const PatchImage& image, int k, const Sim3& map_from_segment,
-                                 const Quat& turn, int* inliers) const {
+  // From where the similarity has the key frame, turned.
+  std::optional<Placement> place(const PatchImage& image, int k, const Sim3& map_from_segment,
+                                 const Quat& turn) const {
     const Rigid3 pose = (map_from_segment * segment_.cam_from_world[k].inverse()).inverse();
     const CameraMotion& motion = segment_motions_[k];
     const MovingPose guess{{turn * pose.rotation, turn * pose.translation},
@@ -133,20 +134,17 @@ class Finder {
     for (const WallPatch& patch : patches_)
       if (foretell(patch, guess, frames_.shutter())) seen.push_back(&patch);
     std::vector<const WallPatch*> chosen;
-    for (const int i : spread(static_cast<int>(seen.size()), static_cast<int>(kPatches)))
+    for (const int i : spread(static_cast<int>(seen.size()), kPatches))
       chosen.push_back(seen[static_cast<std::size_t>(i)]);
-    const auto placed = place_by_patches(chosen, image, guess, registrar_, frames_.shutter(),
-                                         options_.search_px, bundle_);
-    if (!placed) return std::nullopt;
-    if (inliers != nullptr) *inliers = placed->inliers;
-    return placed->cam_from_world;
+    return place_by_patches(chosen, image, guess, registrar_, frames_.shutter(), options_.search_px,
+                            bundle_);
   }
 
   // The first of the key frames that is found by guesses turned this way and that; of the guesses
   // of a ring the one that most patches agree on.
   std::optional<Found> look_around(const Sim3& guess, const std::vector<int>& keyframes) const {
     for (const int k : keyframes) {
-      const PatchImage image = prepare_patch_image(frames_.pose_frame(segment_.frames[k]));
+      const PatchImage image = image_of(k);
       for (int ring = 0; ring <= kRings; ++ring) {
         std::vector<Quat> turns;
         for (int x = -ring; x <= ring; ++x)
@@ -154,14 +152,12 @@ class Finder {
             if (std::max(std::abs(x), std::abs(y)) == ring)
               turns.push_back(Quat(Eigen::AngleAxisd(kRingRad * x, Vec3::UnitX()) *
                                    Eigen::AngleAxisd(kRingRad * y, Vec3::UnitY())));
-        std::vector<std::optional<Rigid3>> poses(turns.size());
-        std::vector<int> inliers(turns.size(), 0);
-        tbb::parallel_for(std::size_t{0}, turns.size(), [&](std::size_t i) {
-          poses[i] = place_in(image, k, guess, turns[i], &inliers[i]);
-        });
-        const auto best = std::ranges::max_element(inliers) - inliers.begin();
-        if (poses[static_cast<std::size_t>(best)])
-          return Found{k, *poses[static_cast<std::size_t>(best)]};
+        std::vector<std::optional<Placement>> placed(turns.size());
+        tbb::parallel_for(std::size_t{0}, turns.size(),
+                          [&](std::size_t i) { placed[i] = place(image, k, guess, turns[i]); });
+        const auto best =
+            std::ranges::max_element(placed, {}, [](const auto& p) { return p ? p->inliers : 0; });
+        if (*best) return Found{k, (*best)->cam_from_world};
       }
     }
     return std::nullopt;
