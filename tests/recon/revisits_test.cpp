@@ -255,6 +255,22 @@ TEST_F(Revisits, SegmentsOfOtherWallStayOut) {
       map_from_segment(frames(), map, patches, segment, RevisitOptions{}, BundleOptions{}));
 }
 
+// What two key frames agree on may be chance.
+TEST_F(Revisits, TwoKeyframesAreNoSegment) {
+  std::vector<Structure> segments = broken(12, 12);
+  ASSERT_EQ(segments.size(), 2u);
+  Structure& segment = segments[1];
+  const auto patches = make_patches(frames(), segments[0]);
+  for (int k = 14; k < kCameras; ++k) segment.placed[k] = false;
+  remove_outliers(segment);
+  ASSERT_EQ(segment.placed_count(), 2);
+  EXPECT_FALSE(
+      map_from_segment(frames(), segments[0], patches, segment, RevisitOptions{}, BundleOptions{}));
+  segments = broken(12, 12);
+  EXPECT_TRUE(map_from_segment(frames(), segments[0], patches, segments[1], RevisitOptions{},
+                               BundleOptions{}));
+}
+
 TEST_F(Revisits, TheNumberOfThreadsChangesNothing) {
   const Structure two = linked();
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 1);
