@@ -31,6 +31,7 @@ enum class Purpose : std::uint32_t {
   scene_draw = 21,
   lens_samples = 16,
   track_points = 17,
+  wall_draws = 18,
 };
 
 /// Four independent 32-bit words for (seed, purpose, frame, index); index is the pixel or whatever

@@ -96,6 +96,7 @@ void fields(Visitor& v, DenseOptions& o) {
   v.number("max_sigma_share", o.max_sigma_share, 1e-6, 1.0);
   v.number("consistent_maps", o.consistent_maps, 0, 100);
   v.number("consistent_sigmas", o.consistent_sigmas, 0.1, 100.0);
+  v.number("gap_sigma_share", o.gap_sigma_share, 0.0, 1.0);
   v.number("voxel_px", o.voxel_px, 0.5, 100.0);
 }
 

@@ -93,7 +93,10 @@ struct DenseOptions {
   double max_sigma_share = 0.05;   // standard deviation of a depth that is believed, over the depth
   int consistent_maps = 1;         // other depth maps that must agree
   double consistent_sigmas = 2.0;  // within so many joint standard deviations
-  double voxel_px = 4.0;           // side of a voxel, in the wall's width of a depth map's pixel
+  /// Standard deviation, over the depth, of a wall that nothing shows between what stereo found; 0:
+  /// gaps are left open, and not looked at again.
+  double gap_sigma_share = 0.006;
+  double voxel_px = 4.0;  // side of a voxel, in the wall's width of a depth map's pixel
   void check() const;
 };
 

@@ -12,6 +12,7 @@
 #include "recon/dense/consistency.h"
 #include "recon/dense/depth_map.h"
 #include "recon/dense/moving_keyframes.h"
+#include "recon/dense/smooth_wall.h"
 #include "recon/dense/view_choice.h"
 #include "recon/dense/volume.h"
 #include "recon/mesh_pieces.h"
@@ -25,6 +26,9 @@ constexpr std::size_t kCachedViews = 48;  // frames as stereo sees them: 0.7 MB 
 constexpr int kComparedMaps = 12;         // others that a depth map is held against
 /// Agreeing pixels in smaller groups than this are chance, of a depth map 400 px wide.
 constexpr double kSmallestIslandPx = 60.0;
+/// Beyond 60 degrees of incidence what spans a gap is more often a curtain from a fold's edge to
+/// what lies behind it than a wall.
+constexpr double kMinGapCosine = 0.5;
 /// Pieces with less than this share of the triangles of the largest piece are noise.
 constexpr double kSmallestPiece = 0.01;
 
@@ -79,42 +83,83 @@ class Views {
   Cache<std::shared_ptr<const StereoView>> cache_{kCachedViews};
 };
 
+/// The views of a set, held.
+struct StereoViews {
+  StereoViews(Views& views, const StereoSet& set) : reference(views.view(set.reference)) {
+    for (const int source : set.sources) {
+      held.push_back(views.view(source));
+      sources.push_back(held.back().get());
+    }
+  }
+  std::shared_ptr<const StereoView> reference;
+  std::vector<std::shared_ptr<const StereoView>> held;
+  std::vector<const StereoView*> sources;
+};
+
+/// Does it for each number, some at a time, with a step of the progress line after each lot.
+template <typename Do>
+void for_some(std::size_t count, Progress& progress, Do one) {
+  for (std::size_t begin = 0; begin < count; begin += kAtOnce) {
+    const std::size_t end = std::min(count, begin + kAtOnce);
+    tbb::parallel_for(begin, end, one);
+    progress.step(end - begin);
+  }
+}
+
 std::vector<DepthMap> depth_maps(const StillKeyframes& frames, const std::vector<StereoSet>& sets,
                                  const DenseOptions& options, Progress& progress) {
   progress.begin("stereo", sets.size());
   Views views(frames, options);
   std::vector<DepthMap> maps(sets.size());
-  for (std::size_t begin = 0; begin < sets.size(); begin += kAtOnce) {
-    const std::size_t end = std::min(sets.size(), begin + kAtOnce);
-    tbb::parallel_for(begin, end, [&](std::size_t i) {
-      const auto reference = views.view(sets[i].reference);
-      std::vector<std::shared_ptr<const StereoView>> held;
-      std::vector<const StereoView*> sources;
-      for (const int source : sets[i].sources) {
-        held.push_back(views.view(source));
-        sources.push_back(held.back().get());
-      }
-      maps[i] = estimate_depth(*reference, sources, frames.prior(sets[i].reference), options);
-    });
-    progress.step(end - begin);
-  }
+  for_some(sets.size(), progress, [&](std::size_t i) {
+    const StereoViews seen(views, sets[i]);
+    maps[i] =
+        estimate_depth(*seen.reference, seen.sources, frames.prior(sets[i].reference), options);
+  });
   return maps;
 }
 
-/// Leaves of each depth map what others agree with; all are compared as they were found.
-void keep_consistent(std::vector<DepthMap>& maps, const DenseOptions& options) {
+/// Leaves of each depth map what others agree with; all are compared as they were found. `unsure`:
+/// where (CV_8U) this is asked, of each map; empty: everywhere.
+void keep_consistent(std::vector<DepthMap>& maps, const std::vector<cv::Mat>& unsure,
+                     const DenseOptions& options) {
   const auto overlapping = overlapping_maps(maps, kComparedMaps);
   std::vector<cv::Mat> agreeing(maps.size());
   tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t i) {
     std::vector<const DepthMap*> others;
     for (const int j : overlapping[i]) others.push_back(&maps[j]);
     agreeing[i] = agreeing_maps(maps[i], others, options.consistent_sigmas);
+    if (!unsure.empty()) agreeing[i].setTo(options.consistent_maps, unsure[i] == 0);
   });
   const double scale = maps.front().grid.width / 400.0;
   const int smallest = static_cast<int>(kSmallestIslandPx * scale * scale);
   tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t i) {
     keep_agreed(maps[i], agreeing[i], options.consistent_maps, smallest);
   });
+}
+
+/// Fills what the depth maps leave open, where the wall between what they found is known well
+/// enough to look again or to be believed, and where they agree on that too.
+void fill_gaps(const StillKeyframes& frames, const std::vector<StereoSet>& sets,
+               std::vector<DepthMap>& maps, const DenseOptions& options, Progress& progress) {
+  progress.begin("gaps", maps.size());
+  Views views(frames, options);
+  std::vector<cv::Mat> filled(maps.size());
+  for_some(sets.size(), progress, [&](std::size_t i) {
+    filled[i] = cv::Mat(maps[i].depth.size(), CV_8U, cv::Scalar(0));
+    const auto wall =
+        smooth_wall(maps[i], sparse_depths(frames.structure(), sets[i].reference, frames.grid()),
+                    frames.prior(sets[i].reference), static_cast<std::uint32_t>(i));
+    if (!wall) return;
+    const StereoViews seen(views, sets[i]);
+    filled[i] = look_again(*seen.reference, seen.sources, wall->depth, options, maps[i]);
+    const cv::Mat believed = (wall->sigma_share <= options.gap_sigma_share) &
+                             (wall->cosine >= kMinGapCosine) & ~(maps[i].depth > 0.0f);
+    wall->depth.copyTo(maps[i].depth, believed);
+    cv::Mat(wall->depth.mul(wall->sigma_share)).copyTo(maps[i].sigma, believed);
+    filled[i] |= believed;
+  });
+  keep_consistent(maps, filled, options);
 }
 
 // Some of the depth maps, as they were found.
@@ -172,7 +217,8 @@ DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
   progress.begin("consistency");
   const std::vector<int> shown = spread(static_cast<int>(maps.size()), examples);
   result.examples = examples_of(still, sets, maps, shown);
-  keep_consistent(maps, options);
+  keep_consistent(maps, {}, options);
+  if (options.gap_sigma_share > 0.0) fill_gaps(still, sets, maps, options, progress);
   for (std::size_t i = 0; i < shown.size(); ++i) {
     result.examples[i].agreed = maps[shown[i]].depth;
     result.examples[i].sigma = maps[shown[i]].sigma;

@@ -1,6 +1,6 @@
 #pragma once
 // The wall from frames whose poses are known: depth maps of some key frames by stereo, what agrees
-// of them, one surface.
+// of them, the wall between, one surface.
 
 #include <opencv2/core/mat.hpp>
 #include <vector>
@@ -17,7 +17,7 @@ namespace rugae {
 struct DepthExample {
   int frame = -1;
   cv::Mat picture;        // CV_8UC3, BGR: the key frame on the depth map's grid
-  cv::Mat found, agreed;  // CV_32F: by stereo, and what other depth maps agree with
+  cv::Mat found, agreed;  // CV_32F: by stereo; what other depth maps agree with, gaps filled
   cv::Mat sigma;          // CV_32F, of `agreed`
 };
 
@@ -31,8 +31,8 @@ struct DenseMap {
   std::vector<DepthExample> examples;
 };
 
-/// Depth maps of chosen key frames, their consistency, fusion. `reflections`: how they are
-/// detected, to be left out; `examples`: how many are to be returned. Memory holds at most
+/// Depth maps of chosen key frames, their consistency, their gaps, fusion. `reflections`: how they
+/// are detected, to be left out; `examples`: how many are to be returned. Memory holds at most
 /// `max_depth_maps` small depth maps, a few frames and the surface. Empty where nothing was placed
 /// or seen from enough places; the same for any number of threads.
 DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,

@@ -27,6 +27,14 @@ constexpr double kSystematicSteps = 0.1;
 /// The first sweep's surface, before the second follows it: median over this many pixels.
 constexpr int kMedianPx = 5;
 
+/// The second look: windows, as a multiple of the first ones' radius; how far from the surface;
+/// what counts.
+constexpr double kAgainRadius = 1.5;
+constexpr double kAgainReachLn = 0.03;
+constexpr double kAgainScore = 2.0 / 3.0;  // of the first look's least
+constexpr double kAgainSigmaShare = 0.01;
+constexpr float kWhole = 0.99f;  // of a mask between pixels
+
 /// What a sweep found, on its grid.
 struct Found {
   cv::Mat depth;     // CV_32F, NaN where unknown
@@ -150,6 +158,41 @@ DepthMap estimate_depth(const StereoView& reference, const std::vector<const Ste
       map.sigma.at<float>(y, x) = found.depth.at<float>(y, x) * sigma_ln;
     }
   return map;
+}
+
+cv::Mat look_again(const StereoView& reference, const std::vector<const StereoView*>& sources,
+                   const cv::Mat& surface, const DenseOptions& options, DepthMap& map) {
+  const int coarsest = kStereoLevels - 1;
+  const cv::Size small = reference.levels[coarsest].grid.size();
+  check(surface.size() == map.depth.size() && surface.type() == CV_32F,
+        "look_again: the surface is not on the map's grid");
+  DenseOptions again = options;
+  again.window_radius_px = static_cast<int>(std::lround(kAgainRadius * options.window_radius_px));
+  again.min_score = kAgainScore * options.min_score;
+  cv::Mat coarse;
+  cv::resize(surface, coarse, small, 0.0, 0.0, cv::INTER_AREA);
+  const Found found = search(reference, sources, coarsest, coarse, kAgainReachLn, again);
+
+  const cv::Mat known = found.depth == found.depth;
+  const auto finer = [&](const cv::Mat& values) {
+    cv::Mat whole(small, CV_32F, cv::Scalar(0.0)), large;
+    values.copyTo(whole, known);
+    cv::resize(whole, large, small * (1 << coarsest), 0.0, 0.0, cv::INTER_LINEAR);
+    return large;
+  };
+  const cv::Mat depth = finer(found.depth), sigma_ln = finer(found.sigma_ln);
+  const cv::Mat share = finer(cv::Mat(small, CV_32F, cv::Scalar(1.0)));
+  cv::Mat fresh(map.depth.size(), CV_8U, cv::Scalar(0));
+  for (int y = 0; y < fresh.rows; ++y)
+    for (int x = 0; x < fresh.cols; ++x) {
+      const float sigma_share = sigma_ln.at<float>(y, x);
+      if (map.depth.at<float>(y, x) > 0.0f || !(share.at<float>(y, x) >= kWhole)) continue;
+      if (!(sigma_share <= static_cast<float>(kAgainSigmaShare))) continue;
+      map.depth.at<float>(y, x) = depth.at<float>(y, x);
+      map.sigma.at<float>(y, x) = sigma_share * depth.at<float>(y, x);
+      fresh.at<uchar>(y, x) = 255;
+    }
+  return fresh;
 }
 
 }  // namespace rugae

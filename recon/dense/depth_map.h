@@ -28,6 +28,16 @@ struct StereoView {
 /// Levels of a StereoView.
 constexpr int kStereoLevels = 2;
 
+/// A place of the wall that tracks give.
+struct SparseDepth {
+  Vec2 pixel;  // of the grid
+  double z = 0.0;
+};
+
+/// The points of the structure that the key frame sees.
+std::vector<SparseDepth> sparse_depths(const Structure& structure, int keyframe,
+                                       const PinholeGrid& grid);
+
 /// Where the search for depth begins.
 struct DepthPrior {
   cv::Mat depth;          // CV_32F, on the grid of the coarsest level; positive everywhere
@@ -46,5 +56,12 @@ DepthPrior depth_prior(const Structure& structure, int keyframe, const PinholeGr
 /// within a wide range of depths.
 DepthMap estimate_depth(const StereoView& reference, const std::vector<const StereoView*>& sources,
                         const DepthPrior& prior, const DenseOptions& options);
+
+/// Looks again where the map has no depth yet, with the wall known about: the coarsest level,
+/// windows half as wide again, which lie on `surface` (CV_32F, z-depth on the map's grid, known
+/// everywhere), and a correlation that would be chance in a search farther from it. CV_8U: 255
+/// where it found one.
+cv::Mat look_again(const StereoView& reference, const std::vector<const StereoView*>& sources,
+                   const cv::Mat& surface, const DenseOptions& options, DepthMap& map);
 
 }  // namespace rugae

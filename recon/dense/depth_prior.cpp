@@ -1,4 +1,4 @@
-// Where the search for depth begins: a smooth surface through the sparse points.
+// What the sparse points say of a key frame's depth.
 
 #include <algorithm>
 #include <cmath>
@@ -25,20 +25,26 @@ constexpr double kBeyondPointsLn = 0.3;
 
 }  // namespace
 
-DepthPrior depth_prior(const Structure& structure, int keyframe, const PinholeGrid& grid) {
-  const Rigid3& cam_from_world = structure.cam_from_world[keyframe];
-  std::vector<FieldSample> samples;
+std::vector<SparseDepth> sparse_depths(const Structure& structure, int keyframe,
+                                       const PinholeGrid& grid) {
+  std::vector<SparseDepth> depths;
   for (const Track& track : structure.tracks) {
     if (!track.triangulated) continue;
     const bool seen = std::ranges::any_of(
         track.observations, [&](const auto& o) { return o.keyframe == keyframe && o.inlier; });
     if (!seen) continue;
-    const Vec3 p_cam = cam_from_world * track.point;
+    const Vec3 p_cam = structure.cam_from_world[keyframe] * track.point;
     if (!(p_cam.z() > 0.0)) continue;
     const Vec2 pixel = grid.project(p_cam);
-    if (!grid.contains(pixel)) continue;
-    samples.push_back({pixel, std::log(p_cam.z()), 0.0, 1.0});
+    if (grid.contains(pixel)) depths.push_back({pixel, p_cam.z()});
   }
+  return depths;
+}
+
+DepthPrior depth_prior(const Structure& structure, int keyframe, const PinholeGrid& grid) {
+  std::vector<FieldSample> samples;
+  for (const SparseDepth& point : sparse_depths(structure, keyframe, grid))
+    samples.push_back({point.pixel, std::log(point.z), 0.0, 1.0});
   if (samples.size() < kMinPoints) return {};
   const double area_px = static_cast<double>(grid.width) * grid.height;
   const double spacing_px =

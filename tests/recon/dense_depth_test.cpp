@@ -23,18 +23,26 @@ struct Setting {
   double scale = 1.0;       // of the world
   double wrong_rad = 0.0;   // sources are believed to be turned by this
   double prior_off = 1.06;  // the prior over the true depth
+  PinholeGrid grid = small_grid();
   DenseOptions options;
 };
 
 /// The reference at the origin and six sources around it, 4 mm off, which looks at a point 30 mm
 /// away from 7.6 degrees off.
-struct Stereo {
-  DepthMap map;
+struct Scene {
+  StereoView reference;
+  std::vector<StereoView> views;
   cv::Mat truth;
+
+  std::vector<const StereoView*> sources() const {
+    std::vector<const StereoView*> pointers;
+    for (const StereoView& view : views) pointers.push_back(&view);
+    return pointers;
+  }
 };
 
-Stereo estimate(const Setting& setting) {
-  const PinholeGrid grid = small_grid();
+Scene scene_of(const Setting& setting) {
+  const PinholeGrid& grid = setting.grid;
   const Mottling mottling(3, setting.contrast, setting.scale);
   const auto view = [&](const Vec3& centre, std::uint32_t frame) {
     const Rigid3 cam_from_world = looking(setting.scale * centre, {0.01 * centre.x(), 0.0, 1.0});
@@ -43,24 +51,31 @@ Stereo estimate(const Setting& setting) {
         setting.scale * kBrightAt, setting.noise_levels, frame);
     return stereo_view(picture, cam_from_world, grid, setting.options);
   };
-  const StereoView reference = view(Vec3::Zero(), 0);
-  std::vector<StereoView> views;
+  Scene scene{view(Vec3::Zero(), 0), {}, true_depth(setting.wall, Rigid3{}, grid)};
   for (int i = 0; i < 6; ++i) {
     const double angle = kPi / 3.0 * i;
-    views.push_back(view(kBaseline * Vec3(std::cos(angle), std::sin(angle), 0.1),
-                         static_cast<std::uint32_t>(i + 1)));
+    scene.views.push_back(view(kBaseline * Vec3(std::cos(angle), std::sin(angle), 0.1),
+                               static_cast<std::uint32_t>(i + 1)));
     const Rigid3 turn(Quat(Eigen::AngleAxisd(
                           setting.wrong_rad,
                           Vec3(std::sin(3.0 * angle + 1.0), std::cos(angle), 0.3).normalized())),
                       Vec3::Zero());
-    views.back().cam_from_world = turn * views.back().cam_from_world;
+    scene.views.back().cam_from_world = turn * scene.views.back().cam_from_world;
   }
-  std::vector<const StereoView*> sources;
-  for (const StereoView& v : views) sources.push_back(&v);
+  return scene;
+}
+
+struct Stereo {
+  DepthMap map;
+  cv::Mat truth;
+};
+
+Stereo estimate(const Setting& setting) {
+  const Scene scene = scene_of(setting);
   const DepthPrior prior{
-      setting.prior_off * true_depth(setting.wall, Rigid3{}, reference.levels.back().grid), 0.2};
-  return {estimate_depth(reference, sources, prior, setting.options),
-          true_depth(setting.wall, Rigid3{}, grid)};
+      setting.prior_off * true_depth(setting.wall, Rigid3{}, scene.reference.levels.back().grid),
+      0.2};
+  return {estimate_depth(scene.reference, scene.sources(), prior, setting.options), scene.truth};
 }
 
 struct Errors {
@@ -150,6 +165,38 @@ TEST(DenseDepth, WrongPosesFindLittle) {
   Setting setting;
   setting.wrong_rad = 6.0 * kPi / 180.0;
   EXPECT_LE(errors_of(estimate(setting)).known_share, 2.0 * kChance);
+}
+
+TEST(DenseDepth, AGapIsFoundFromASurfaceCloseByAndTheRestLeftAlone) {
+  Setting setting;
+  setting.contrast = 0.1;
+  setting.noise_levels = 1.0;
+  setting.grid = {320, 240, 160.0, 160.0, 160.0, 120.0};
+  const Scene scene = scene_of(setting);
+  const cv::Mat whole = estimate(setting).map.depth;
+  const cv::Rect gap(80, 60, 160, 120);
+  const auto again = [&](double off) {
+    Stereo stereo = estimate(setting);
+    stereo.map.depth(gap).setTo(std::nanf(""));
+    stereo.map.sigma(gap).setTo(std::nanf(""));
+    const cv::Mat found = look_again(scene.reference, scene.sources(), off * scene.truth,
+                                     setting.options, stereo.map);
+    EXPECT_EQ(cv::countNonZero(found & ~(stereo.map.depth > 0.0f)), 0);
+    for (int y = 0; y < whole.rows; ++y)
+      for (int x = 0; x < whole.cols; ++x) {
+        if (found.at<uchar>(y, x) != 0 || !(whole.at<float>(y, x) > 0.0f)) continue;
+        const float z = stereo.map.depth.at<float>(y, x);
+        EXPECT_TRUE(gap.contains({x, y}) ? std::isnan(z) : z == whole.at<float>(y, x));
+      }
+    stereo.map.depth.setTo(std::nanf(""), found == 0);
+    return std::pair{errors_of(stereo),
+                     cv::countNonZero(found(gap)) / static_cast<double>(gap.area())};
+  };
+  const auto [errors, share] = again(1.01);
+  EXPECT_GE(share, 0.9);
+  EXPECT_LE(errors.median, kTwentiethOfAPixel);
+  EXPECT_GE(errors.within_three, 0.97);
+  EXPECT_LE(again(1.15).second, 2.0 * kChance);  // 1.6 px off on the coarser level
 }
 
 TEST(DenseDepth, FewSourcesOrNoPriorFindNothing) {
