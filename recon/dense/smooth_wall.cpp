@@ -76,7 +76,8 @@ class Wall {
   /// False where the equations cannot be solved.
   bool solve() {
     for (int round = 0; round < kRounds; ++round) {
-      assemble();
+      // Far from the solution everything would look wrong: first all terms count.
+      assemble(round > 0);
       if (round == 0) cholesky_.analyzePattern(hessian_);
       cholesky_.factorize(hessian_);
       if (cholesky_.info() != Eigen::Success) return false;
@@ -188,7 +189,7 @@ class Wall {
       }
   }
 
-  void assemble() {
+  void assemble(bool robustly) {
     std::vector<std::array<double, kSide * kSide>> stencils(rho_.size());
     for (auto& stencil : stencils) stencil.fill(0.0);
     gradient_ = Eigen::VectorXd::Zero(cells());
@@ -207,8 +208,8 @@ class Wall {
       }
     };
     for (const Term& term : priors_) add(term, false);
-    for (const Term& term : anchors_) add(term, true);
-    for_bends([&](const Term& term) { add(term, true); });
+    for (const Term& term : anchors_) add(term, robustly);
+    for_bends([&](const Term& term) { add(term, robustly); });
 
     hessian_.resize(cells(), cells());
     hessian_.reserve(Eigen::VectorXi::Constant(cells(), kSide * kSide));

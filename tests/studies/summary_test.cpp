@@ -118,7 +118,10 @@ TEST(Summary, ThePageHasOursAndThePublished) {
 
 TEST(Published, NumbersOfThePaper) {
   EXPECT_DOUBLE_EQ(published("ate", "6", "awaiba-naneye").value(), 87.3);
+  // By the names of studies/presets/preprocessing.yaml.
   EXPECT_DOUBLE_EQ(published("map_preprocessing", "1", "NPR").value(), 54.5);
+  EXPECT_DOUBLE_EQ(published("ate_preprocessing", "1", "NPR").value(), 41.2);
+  EXPECT_DOUBLE_EQ(published("ate_preprocessing", "6", "RSPM+RUD+DV").value(), 51.2);
   EXPECT_EQ(published("features", "ORB", "potensic-mini"), 0.35);
   EXPECT_EQ(published("map", "4", "potensic-mini"), std::nullopt);
   EXPECT_EQ(published("none", "1", "misumi-v5506"), std::nullopt);
