@@ -32,7 +32,7 @@ DepthPrior prior_for(const cv::Mat& truth) {
 }
 
 // Straight in inverse depth: nothing bends it but the prior. One that is wrong by a fifth may pull
-// by a fortieth of that, the right one not at all.
+// by a twentieth of that, the right one not at all.
 TEST(SmoothWall, GoesOnAlongAPlane) {
   constexpr double kPull = 0.01, kExact = 1e-4;
   const DenseWall wall = plane_wall({0.3, -0.2, 1.0}, kDistance);
