@@ -27,8 +27,9 @@ constexpr double kSystematicSteps = 0.1;
 /// The first sweep's surface, before the second follows it: median over this many pixels.
 constexpr int kMedianPx = 5;
 
-/// The second look: windows, as a multiple of the first ones' radius; how far from the surface;
-/// what counts.
+/// The second look: windows, as a multiple of the first ones' radius; how far from the surface,
+/// which nine times in ten is that close; what counts. Windows half as wide again as these find no
+/// more; twice this sigma 0.01 more recall at 1 mm for 0.01 less precision.
 constexpr double kAgainRadius = 1.5;
 constexpr double kAgainReachLn = 0.03;
 constexpr double kAgainScore = 2.0 / 3.0;  // of the first look's least
