@@ -1,7 +1,5 @@
 #include "recon/pipeline.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
@@ -11,6 +9,7 @@
 #include "dataset/image_io.h"
 #include "recon/dense/dense_map.h"
 #include "recon/dense/moving_keyframes.h"
+#include "recon/in_lots.h"
 #include "recon/map.h"
 #include "recon/mosaic.h"
 #include "recon/pictures.h"
@@ -29,13 +28,9 @@ std::vector<std::optional<MosaicDepth>> place_all(const std::vector<Mosaic>& mos
                                                   Progress& progress) {
   progress.begin("shape from shading", mosaics.size());
   std::vector<std::optional<MosaicDepth>> depths(mosaics.size());
-  for (std::size_t begin = 0; begin < mosaics.size(); begin += kAtOnce) {
-    const std::size_t end = std::min(mosaics.size(), begin + kAtOnce);
-    tbb::parallel_for(begin, end, [&](std::size_t i) {
-      depths[i] = stages.depth(mosaics[i], structure, lens, options);
-    });
-    progress.step(end - begin);
-  }
+  do_in_lots(mosaics.size(), kAtOnce, progress, [&](std::size_t i) {
+    depths[i] = stages.depth(mosaics[i], structure, lens, options);
+  });
   const auto placed = std::ranges::count_if(depths, [](const auto& d) { return d.has_value(); });
   progress.end(fmt::format("{} of {} mosaics placed", placed, mosaics.size()));
   return depths;
@@ -51,15 +46,11 @@ void write_depth(const EstimateLayout& layout, const TriangleMesh& map, const St
     if (structure.placed[k]) placed.push_back(static_cast<int>(k));
   progress.begin("depth of key frames", placed.size());
   const std::vector<Vec3> rays = pixel_rays(shutter.original());
-  for (std::size_t begin = 0; begin < placed.size(); begin += kAtOnce) {
-    const std::size_t end = std::min(placed.size(), begin + kAtOnce);
-    tbb::parallel_for(begin, end, [&](std::size_t i) {
-      const int k = placed[i];
-      write_exr(layout.depth(structure.frames[k]),
-                keyframe_depth(map, {structure.cam_from_world[k], motions[k]}, shutter, rays));
-    });
-    progress.step(end - begin);
-  }
+  do_in_lots(placed.size(), kAtOnce, progress, [&](std::size_t i) {
+    const int k = placed[i];
+    write_exr(layout.depth(structure.frames[k]),
+              keyframe_depth(map, {structure.cam_from_world[k], motions[k]}, shutter, rays));
+  });
   progress.end();
 }
 

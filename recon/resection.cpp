@@ -1,7 +1,6 @@
 #include "recon/resection.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <memory>
@@ -12,6 +11,7 @@
 #include "recon/cache.h"
 #include "recon/flow_guess.h"
 #include "recon/frames_between.h"
+#include "recon/in_lots.h"
 #include "recon/tracks.h"
 
 namespace rugae {
@@ -218,14 +218,10 @@ std::vector<std::optional<Rigid3>> resect_frames(const FrameSource& frames,
   }
   const std::vector<std::vector<Seen>> seen = points_seen(structure);
   const Resector resector(frames, align_options, options, seed);
-  for (std::size_t begin = 0; begin < rest.size(); begin += kFramesAtOnce) {
-    const std::size_t end = std::min(rest.size(), begin + kFramesAtOnce);
-    tbb::parallel_for(begin, end, [&](std::size_t i) {
-      poses[rest[i]] = resector.impl_->place(
-          structure, placed, rest[i], [&](int k) -> const auto& { return seen[k]; });
-    });
-    progress.step(end - begin);
-  }
+  do_in_lots(rest.size(), kFramesAtOnce, progress, [&](std::size_t i) {
+    poses[rest[i]] = resector.impl_->place(
+        structure, placed, rest[i], [&](int k) -> const auto& { return seen[k]; });
+  });
   const auto lost =
       std::count_if(poses.begin(), poses.end(), [](const auto& pose) { return !pose; });
   progress.end(fmt::format("{} of {} frames placed, {} lost", n - lost, n, lost));

@@ -16,40 +16,57 @@ constexpr double kMinOverlap = 0.05;  // of the depths looked at
 /// Depths of one wall seen by two maps differ by less than this, whatever their sigma.
 constexpr double kOverlapShare = 0.1;
 
-/// The depth and sigma that a map has where it sees the point, from the nearest pixel.
+/// What a map has where it sees a point, from the nearest pixel.
 struct Seen {
   double z = 0.0;  // of the point
-  float depth = std::numeric_limits<float>::quiet_NaN(), sigma = 0.0f;
+  double depth = std::numeric_limits<double>::quiet_NaN(), sigma = 0.0;
 };
 
-Seen seen_at(const DepthMap& map, const Vec3& p_cam) {
-  Seen seen{p_cam.z()};
-  if (!(p_cam.z() > 0.0)) return seen;
-  const Vec2 pixel = map.grid.project(p_cam);
-  if (!map.grid.contains(pixel)) return seen;
-  const int x = static_cast<int>(pixel.x()), y = static_cast<int>(pixel.y());
-  seen.depth = map.depth.at<float>(y, x);
-  seen.sigma = map.sigma.at<float>(y, x);
-  return seen;
-}
+/// Another map, and where it sees points of the first one.
+class OtherMap {
+ public:
+  OtherMap(const DepthMap& other, const DepthMap& first) : map_(other) {
+    const Rigid3 other_from_first = other.cam_from_world * first.cam_from_world.inverse();
+    rotation_ = other_from_first.rotation.toRotationMatrix();
+    translation_ = other_from_first.translation;
+  }
+
+  Seen seen(const Vec3& p_first) const {
+    const Vec3 p = rotation_ * p_first + translation_;
+    Seen seen{p.z()};
+    if (!(p.z() > 0.0)) return seen;
+    const Vec2 pixel = map_.grid.project(p);
+    if (!map_.grid.contains(pixel)) return seen;
+    const int x = static_cast<int>(pixel.x()), y = static_cast<int>(pixel.y());
+    seen.depth = map_.depth.at<float>(y, x);
+    seen.sigma = map_.sigma.at<float>(y, x);
+    return seen;
+  }
+
+ private:
+  const DepthMap& map_;
+  Mat3 rotation_;
+  Vec3 translation_;
+};
+
+double squared(double v) { return v * v; }
 
 }  // namespace
 
 cv::Mat agreeing_maps(const DepthMap& map, const std::vector<const DepthMap*>& others,
                       double sigmas) {
   cv::Mat agreeing(map.depth.size(), CV_8U, cv::Scalar(0));
-  std::vector<Rigid3> other_from_map;
-  for (const DepthMap* other : others)
-    other_from_map.push_back(other->cam_from_world * map.cam_from_world.inverse());
+  std::vector<OtherMap> other_maps;
+  for (const DepthMap* other : others) other_maps.emplace_back(*other, map);
   for (int y = 0; y < map.grid.height; ++y)
     for (int x = 0; x < map.grid.width; ++x) {
       const double z = map.depth.at<float>(y, x), sigma = map.sigma.at<float>(y, x);
       if (!(z > 0.0)) continue;
-      const Vec3 p_map = z * map.grid.ray(x, y);
-      for (std::size_t i = 0; i < others.size(); ++i) {
-        const Seen seen = seen_at(*others[i], other_from_map[i] * p_map);
-        if (!(std::abs(seen.depth - seen.z) <= sigmas * std::hypot(sigma, seen.sigma))) continue;
-        ++agreeing.at<uchar>(y, x);
+      const Vec3 p = z * map.grid.ray(x, y);
+      for (const OtherMap& other : other_maps) {
+        const Seen seen = other.seen(p);
+        const double variance = squared(sigma) + squared(seen.sigma);
+        if (squared(seen.depth - seen.z) <= squared(sigmas) * variance) ++agreeing.at<uchar>(y, x);
       }
     }
   return agreeing;
@@ -81,10 +98,10 @@ std::vector<std::vector<int>> overlapping_maps(const std::vector<DepthMap>& maps
     std::vector<std::pair<int, int>> found;  // minus the number of points, the map
     for (std::size_t j = 0; j < maps.size(); ++j) {
       if (j == i) continue;
-      const Rigid3 j_from_i = maps[j].cam_from_world * map.cam_from_world.inverse();
+      const OtherMap other(maps[j], map);
       int count = 0;
       for (const Vec3& p : points) {
-        const Seen seen = seen_at(maps[j], j_from_i * p);
+        const Seen seen = other.seen(p);
         count += std::abs(seen.depth - seen.z) <= kOverlapShare * seen.z ? 1 : 0;
       }
       if (count > 0 && count >= kMinOverlap * static_cast<double>(points.size()))

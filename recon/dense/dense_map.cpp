@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <opencv2/core.hpp>
 
 #include "recon/cache.h"
@@ -15,6 +18,7 @@
 #include "recon/dense/smooth_wall.h"
 #include "recon/dense/view_choice.h"
 #include "recon/dense/volume.h"
+#include "recon/in_lots.h"
 #include "recon/mesh_pieces.h"
 #include "recon/spread.h"
 
@@ -62,7 +66,8 @@ class StillKeyframes {
   std::vector<CameraMotion> motions_;  // empty: all rows were read at once
 };
 
-/// Key frames as stereo sees them, the latest kept.
+/// Key frames as stereo sees them, the latest kept, and of all that were read the coarsest level:
+/// an eighth of a megabyte each, so that none is read twice.
 class Views {
  public:
   Views(const StillKeyframes& frames, const DenseOptions& options)
@@ -70,14 +75,25 @@ class Views {
 
   std::shared_ptr<const StereoView> view(int keyframe) {
     return cache_.get(keyframe, [&] {
-      return std::make_shared<const StereoView>(
-          StereoView{frames_.structure().cam_from_world[keyframe],
-                     stereo_levels(frames_.read(keyframe), frames_.grid(), kStereoLevels,
-                                   options_.window_radius_px)});
+      StereoView view{frames_.structure().cam_from_world[keyframe],
+                      stereo_levels(frames_.read(keyframe), frames_.grid(), kStereoLevels,
+                                    options_.window_radius_px)};
+      StereoView coarsest = view;
+      for (int level = 0; level + 1 < kStereoLevels; ++level)
+        coarsest.levels[level].texture.release();
+      {
+        const std::lock_guard lock(mutex_);
+        coarsest_.try_emplace(keyframe, std::make_shared<const StereoView>(std::move(coarsest)));
+      }
+      return std::make_shared<const StereoView>(std::move(view));
     });
   }
+  /// Of a view that was asked for before.
+  std::shared_ptr<const StereoView> coarsest(int keyframe) const { return coarsest_.at(keyframe); }
 
  private:
+  std::mutex mutex_;
+  std::map<int, std::shared_ptr<const StereoView>> coarsest_;
   const StillKeyframes& frames_;
   const DenseOptions& options_;
   Cache<std::shared_ptr<const StereoView>> cache_{kCachedViews};
@@ -85,9 +101,10 @@ class Views {
 
 /// The views of a set, held.
 struct StereoViews {
-  StereoViews(Views& views, const StereoSet& set) : reference(views.view(set.reference)) {
+  template <typename ViewOf>
+  StereoViews(const StereoSet& set, ViewOf view_of) : reference(view_of(set.reference)) {
     for (const int source : set.sources) {
-      held.push_back(views.view(source));
+      held.push_back(view_of(source));
       sources.push_back(held.back().get());
     }
   }
@@ -96,23 +113,12 @@ struct StereoViews {
   std::vector<const StereoView*> sources;
 };
 
-/// Does it for each number, some at a time, with a step of the progress line after each lot.
-template <typename Do>
-void for_some(std::size_t count, Progress& progress, Do one) {
-  for (std::size_t begin = 0; begin < count; begin += kAtOnce) {
-    const std::size_t end = std::min(count, begin + kAtOnce);
-    tbb::parallel_for(begin, end, one);
-    progress.step(end - begin);
-  }
-}
-
 std::vector<DepthMap> depth_maps(const StillKeyframes& frames, const std::vector<StereoSet>& sets,
-                                 const DenseOptions& options, Progress& progress) {
+                                 Views& views, const DenseOptions& options, Progress& progress) {
   progress.begin("stereo", sets.size());
-  Views views(frames, options);
   std::vector<DepthMap> maps(sets.size());
-  for_some(sets.size(), progress, [&](std::size_t i) {
-    const StereoViews seen(views, sets[i]);
+  do_in_lots(sets.size(), kAtOnce, progress, [&](std::size_t i) {
+    const StereoViews seen(sets[i], [&](int k) { return views.view(k); });
     maps[i] =
         estimate_depth(*seen.reference, seen.sources, frames.prior(sets[i].reference), options);
   });
@@ -140,18 +146,17 @@ void keep_consistent(std::vector<DepthMap>& maps, const std::vector<cv::Mat>& un
 
 /// Fills what the depth maps leave open, where the wall between what they found is known well
 /// enough to look again or to be believed, and where they agree on that too.
-void fill_gaps(const StillKeyframes& frames, const std::vector<StereoSet>& sets,
+void fill_gaps(const StillKeyframes& frames, const std::vector<StereoSet>& sets, const Views& views,
                std::vector<DepthMap>& maps, const DenseOptions& options, Progress& progress) {
   progress.begin("gaps", maps.size());
-  Views views(frames, options);
   std::vector<cv::Mat> filled(maps.size());
-  for_some(sets.size(), progress, [&](std::size_t i) {
+  do_in_lots(sets.size(), kAtOnce, progress, [&](std::size_t i) {
     filled[i] = cv::Mat(maps[i].depth.size(), CV_8U, cv::Scalar(0));
     const auto wall =
         smooth_wall(maps[i], sparse_depths(frames.structure(), sets[i].reference, frames.grid()),
                     frames.prior(sets[i].reference), static_cast<std::uint32_t>(i));
     if (!wall) return;
-    const StereoViews seen(views, sets[i]);
+    const StereoViews seen(sets[i], [&](int k) { return views.coarsest(k); });
     filled[i] = look_again(*seen.reference, seen.sources, wall->depth, options, maps[i]);
     const cv::Mat believed = (wall->sigma_share <= options.gap_sigma_share) &
                              (wall->cosine >= kMinGapCosine) & ~(maps[i].depth > 0.0f);
@@ -213,12 +218,13 @@ DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
   if (sets.empty()) return result;
   const WideFrames wide(frames, reflections, options.width_px);
   const StillKeyframes still(frames, wide, structure);
-  std::vector<DepthMap> maps = depth_maps(still, sets, options, progress);
+  Views views(still, options);
+  std::vector<DepthMap> maps = depth_maps(still, sets, views, options, progress);
   progress.begin("consistency");
   const std::vector<int> shown = spread(static_cast<int>(maps.size()), examples);
   result.examples = examples_of(still, sets, maps, shown);
   keep_consistent(maps, {}, options);
-  if (options.gap_sigma_share > 0.0) fill_gaps(still, sets, maps, options, progress);
+  if (options.gap_sigma_share > 0.0) fill_gaps(still, sets, views, maps, options, progress);
   for (std::size_t i = 0; i < shown.size(); ++i) {
     result.examples[i].agreed = maps[shown[i]].depth;
     result.examples[i].sigma = maps[shown[i]].sigma;

@@ -1,13 +1,13 @@
 #include "recon/dense/frame_poses.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 
 #include "recon/dense/moving_keyframes.h"
 #include "recon/dense/place_by_patches.h"
 #include "recon/frames_between.h"
+#include "recon/in_lots.h"
 
 namespace rugae {
 namespace {
@@ -58,23 +58,19 @@ std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
   const RollingShutter& shutter = frames.shutter();
   const cv::Mat none = cv::Mat::zeros(frames.valid().size(), CV_8U);
   const auto place_all = [&](const auto& guesses_of) {
-    for (std::size_t begin = 0; begin < rest.size(); begin += kFramesAtOnce) {
-      const std::size_t end = std::min(rest.size(), begin + kFramesAtOnce);
-      tbb::parallel_for(begin, end, [&](std::size_t i) {
-        const int f = rest[i];
-        const PatchImage image = prepare_patch_image({f, frames.gray(f), {}, none, frames.valid()});
-        const Between around = between(structure, placed, f);
-        const auto seen = seen_by(around.keyframes, patches_of, patches);
-        for (const MovingPose& guess : guesses_of(f, around)) {
-          const auto placed =
-              place_by_patches(seen, image, guess, registrar, shutter, kSearchPx, options);
-          if (!placed) continue;
-          poses[f] = placed->cam_from_world;
-          break;
-        }
-      });
-      progress.step(end - begin);
-    }
+    do_in_lots(rest.size(), kFramesAtOnce, progress, [&](std::size_t i) {
+      const int f = rest[i];
+      const PatchImage image = prepare_patch_image({f, frames.gray(f), {}, none, frames.valid()});
+      const Between around = between(structure, placed, f);
+      const auto seen = seen_by(around.keyframes, patches_of, patches);
+      for (const MovingPose& guess : guesses_of(f, around)) {
+        const auto placed =
+            place_by_patches(seen, image, guess, registrar, shutter, kSearchPx, options);
+        if (!placed) continue;
+        poses[f] = placed->cam_from_world;
+        break;
+      }
+    });
   };
   const std::vector<CameraMotion> motions = keyframe_motions(frames, structure);
   place_all([&](int, const Between& around) {

@@ -1,13 +1,13 @@
 #include "recon/dense/revisits.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "recon/dense/moving_keyframes.h"
 #include "recon/dense/register_patch.h"
+#include "recon/in_lots.h"
 #include "recon/mask_at.h"
 #include "recon/resection.h"
 #include "recon/tracks.h"
@@ -139,16 +139,12 @@ RevisitReport observe_again(const FrameSource& frames, const std::vector<WallPat
   const PatchRegistrar registrar(frames.lens());
   const std::vector<CameraMotion> motions = keyframe_motions(frames, structure);
   std::vector<FrameResult> results(n);
-  for (std::size_t begin = 0; begin < n; begin += kAtOnce) {
-    const std::size_t end = std::min(n, begin + kAtOnce);
-    tbb::parallel_for(begin, end, [&](std::size_t k) {
-      if (!structure.placed[k]) return;
-      const PatchImage image = prepare_patch_image(frames.pose_frame(structure.frames[k]));
-      results[k] = look_in(static_cast<int>(k), motions[k], image, patches, known[k], registrar,
-                           frames.shutter(), structure, options, bundle);
-    });
-    progress.step(end - begin);
-  }
+  do_in_lots(n, kAtOnce, progress, [&](std::size_t k) {
+    if (!structure.placed[k]) return;
+    const PatchImage image = prepare_patch_image(frames.pose_frame(structure.frames[k]));
+    results[k] = look_in(static_cast<int>(k), motions[k], image, patches, known[k], registrar,
+                         frames.shutter(), structure, options, bundle);
+  });
   RevisitReport report;
   report.patches = patches.size();
   for (std::size_t k = 0; k < n; ++k) {

@@ -29,12 +29,14 @@ constexpr int kLeastPixels = 4;       // of a cell's known ones
 constexpr int kLeastCells = 24;       // known: fewer say nothing of a wall
 constexpr double kCauchy = 2.0;       // residual, in sigmas, at which a term's weight has halved
 constexpr int kRounds = 4;
-constexpr double kConverged = 1e-3;  // largest relative change of a round
+/// Largest relative change of a round, anywhere: half of what is believed to be known at best.
+constexpr double kConverged = 3e-3;
 constexpr int kDraws =
     4;  // averaged over 25 cells: sigma to a tenth; more cost more than they tell
 constexpr double kWidestStep = 2.0;  // inverse depth changes by this factor at most in a round
 /// Pixels of a cell, each way: about half a window of the correlation, which sees nothing finer.
 constexpr int kCellPx = 4;
+constexpr int kCoarseCellPx = 8;  // of a first wall, where a solution costs an eighth
 constexpr int kReach = 2, kSide = 2 * kReach + 1;  // cells that a cell is tied to
 
 /// One residual: linear in the inverse depths of a few cells.
@@ -51,12 +53,21 @@ struct Term {
   }
 };
 
+/// Cells to pixels, or to smaller cells; both grids begin at the same corner.
+cv::Mat pixels_of(const cv::Mat& cells, int cell_px, cv::Size size) {
+  cv::Mat pixels;
+  cv::resize(cells, pixels, cells.size() * cell_px, 0.0, 0.0, cv::INTER_LINEAR);
+  return pixels({0, 0, size.width, size.height});
+}
+
 class Wall {
  public:
-  Wall(const DepthMap& map, const std::vector<SparseDepth>& points, const DepthPrior& prior)
-      : width_((map.grid.width + kCellPx - 1) / kCellPx),
-        height_((map.grid.height + kCellPx - 1) / kCellPx),
-        bend_(kBend * std::pow(kCellPx / map.grid.fx, 2)) {
+  Wall(const DepthMap& map, const std::vector<SparseDepth>& points, const DepthPrior& prior,
+       int cell_px)
+      : cell_px_(cell_px),
+        width_((map.grid.width + cell_px - 1) / cell_px),
+        height_((map.grid.height + cell_px - 1) / cell_px),
+        bend_(kBend * std::pow(cell_px / map.grid.fx, 2)) {
     observe(map);
     cv::Mat surface;
     cv::resize(prior.depth, surface, {width_, height_}, 0.0, 0.0, cv::INTER_AREA);
@@ -66,32 +77,27 @@ class Wall {
       if (!std::isfinite(rho_[i])) rho_[i] = rho;
     }
     for (const SparseDepth& point : points) {
-      const int x = static_cast<int>(point.pixel.x() / kCellPx);
-      const int y = static_cast<int>(point.pixel.y() / kCellPx);
+      const int x = static_cast<int>(point.pixel.x() / cell_px_);
+      const int y = static_cast<int>(point.pixel.y() / cell_px_);
       add_anchor(anchors_, y * width_ + x, 1.0 / point.z, kPointSigma);
     }
   }
 
   int known() const { return known_; }
 
-  /// False where the equations cannot be solved.
-  bool solve() {
+  void start_from(const cv::Mat& inverse_depth) {
+    const cv::Mat start = pixels_of(inverse_depth, kCoarseCellPx / kCellPx, {width_, height_});
+    for (int i = 0; i < cells(); ++i) rho_[i] = start.at<float>(i / width_, i % width_);
+  }
+
+  /// All terms count in full: far from the solution everything would look wrong. False where the
+  /// equations cannot be solved.
+  bool solve_plainly() { return improve(false).has_value(); }
+  bool solve_robustly() {
     for (int round = 0; round < kRounds; ++round) {
-      // Far from the solution everything would look wrong: first all terms count.
-      assemble(round > 0);
-      if (round == 0) cholesky_.analyzePattern(hessian_);
-      cholesky_.factorize(hessian_);
-      if (cholesky_.info() != Eigen::Success) return false;
-      const Eigen::VectorXd step = cholesky_.solve(-gradient_);
-      double largest = 0.0;
-      for (int i = 0; i < cells(); ++i) {
-        const double next =
-            std::clamp(rho_[i] + step[i], rho_[i] / kWidestStep, rho_[i] * kWidestStep);
-        largest = std::max(largest, std::abs(next / rho_[i] - 1.0));
-        rho_[i] = next;
-      }
-      if (!std::isfinite(largest)) return false;
-      if (largest < kConverged) break;
+      const auto change = improve(true);
+      if (!change) return false;
+      if (*change < kConverged) break;
     }
     return true;
   }
@@ -104,7 +110,7 @@ class Wall {
       for (int x = 0; x < width_; ++x) {
         const int left = std::max(x - 1, 0), right = std::min(x + 1, width_ - 1);
         const int up = std::max(y - 1, 0), down = std::min(y + 1, height_ - 1);
-        const double px = kCellPx;
+        const double px = cell_px_;
         const Vec2 slope(
             grid.fx * (rho_[y * width_ + right] - rho_[y * width_ + left]) / (px * (right - left)),
             grid.fy * (rho_[down * width_ + x] - rho_[up * width_ + x]) / (px * (down - up)));
@@ -127,13 +133,14 @@ class Wall {
   /// P' L'^-1 D^-1/2 z has the variance of H^-1.
   cv::Mat variance(std::uint32_t number) const {
     cv::Mat sum(height_, width_, CV_32F, cv::Scalar(0.0));
+    const Eigen::VectorXd deviations = cholesky_.vectorD().cwiseSqrt().cwiseInverse();
     Eigen::VectorXd draw(cells());
     for (int d = 0; d < kDraws; ++d) {
       for (int i = 0; i < cells(); ++i) {
         const std::uint64_t bit = static_cast<std::uint64_t>(d) * cells() + i;
         const auto words = random_words(0, Purpose::wall_draws, number, bit / 128);
         const bool up = words[bit / 32 % 4] >> (bit % 32) & 1;
-        draw[i] = (up ? 1.0 : -1.0) / std::sqrt(cholesky_.vectorD()[i]);
+        draw[i] = up ? deviations[i] : -deviations[i];
       }
       const Eigen::VectorXd x = cholesky_.permutationPinv() * cholesky_.matrixU().solve(draw);
       for (int i = 0; i < cells(); ++i)
@@ -160,8 +167,8 @@ class Wall {
       for (int x = 0; x < width_; ++x) {
         double sum = 0.0, sigmas = 0.0;
         int count = 0;
-        for (int v = kCellPx * y; v < std::min(kCellPx * (y + 1), map.grid.height); ++v)
-          for (int u = kCellPx * x; u < std::min(kCellPx * (x + 1), map.grid.width); ++u) {
+        for (int v = cell_px_ * y; v < std::min(cell_px_ * (y + 1), map.grid.height); ++v)
+          for (int u = cell_px_ * x; u < std::min(cell_px_ * (x + 1), map.grid.width); ++u) {
             const double z = map.depth.at<float>(v, u);
             if (!(z > 0.0)) continue;
             sum += 1.0 / z;
@@ -188,6 +195,23 @@ class Wall {
         if (x + 1 < width_ && y + 1 < height_)
           use(Term{{i, i + 1, i + width_, i + width_ + 1}, {c, -c, -c, c}, 4});
       }
+  }
+
+  /// One step of Gauss and Newton: the largest relative change, or nothing.
+  std::optional<double> improve(bool robustly) {
+    assemble(robustly);
+    if (cholesky_.rows() == 0) cholesky_.analyzePattern(hessian_);
+    cholesky_.factorize(hessian_);
+    if (cholesky_.info() != Eigen::Success) return std::nullopt;
+    const Eigen::VectorXd step = cholesky_.solve(-gradient_);
+    double largest = 0.0;
+    for (int i = 0; i < cells(); ++i) {
+      const double next =
+          std::clamp(rho_[i] + step[i], rho_[i] / kWidestStep, rho_[i] * kWidestStep);
+      largest = std::max(largest, std::abs(next / rho_[i] - 1.0));
+      rho_[i] = next;
+    }
+    return std::isfinite(largest) ? std::optional(largest) : std::nullopt;
   }
 
   void assemble(bool robustly) {
@@ -225,7 +249,7 @@ class Wall {
     hessian_.makeCompressed();
   }
 
-  int width_ = 0, height_ = 0, known_ = 0;
+  int cell_px_, width_, height_, known_ = 0;
   double bend_ = 0.0;
   std::vector<double> rho_;
   std::vector<Term> anchors_, priors_;
@@ -234,26 +258,20 @@ class Wall {
   Eigen::SimplicialLDLT<Matrix, Eigen::Lower> cholesky_;
 };
 
-/// Cells to pixels; both grids begin at the same corner.
-cv::Mat finer(const cv::Mat& cells, cv::Size size) {
-  cv::Mat pixels;
-  cv::resize(cells, pixels, {cells.cols * kCellPx, cells.rows * kCellPx}, 0.0, 0.0,
-             cv::INTER_LINEAR);
-  return pixels({0, 0, size.width, size.height});
-}
-
 }  // namespace
 
 std::optional<SmoothWall> smooth_wall(const DepthMap& map, const std::vector<SparseDepth>& points,
                                       const DepthPrior& prior, std::uint32_t number) {
   if (prior.depth.empty()) return std::nullopt;
-  Wall wall(map, points, prior);
-  if (wall.known() < kLeastCells || !wall.solve()) return std::nullopt;
+  Wall coarse(map, points, prior, kCoarseCellPx), wall(map, points, prior, kCellPx);
+  if (wall.known() < kLeastCells || !coarse.solve_plainly()) return std::nullopt;
+  wall.start_from(coarse.inverse_depth());
+  if (!wall.solve_robustly()) return std::nullopt;
   const cv::Size size = map.depth.size();
   SmoothWall smooth;
-  smooth.depth = 1.0 / finer(wall.inverse_depth(), size);
-  cv::sqrt(finer(wall.variance(number), size), smooth.sigma_share);
-  smooth.cosine = finer(wall.cosine(map.grid), size);
+  smooth.depth = 1.0 / pixels_of(wall.inverse_depth(), kCellPx, size);
+  cv::sqrt(pixels_of(wall.variance(number), kCellPx, size), smooth.sigma_share);
+  smooth.cosine = pixels_of(wall.cosine(map.grid), kCellPx, size);
   return smooth;
 }
 

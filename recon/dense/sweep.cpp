@@ -1,20 +1,17 @@
 #include "recon/dense/sweep.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
+
+#include "core/float4.h"
+#include "recon/dense/window_correlation.h"
 
 namespace rugae {
 namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-/// This share of a window must be seen by both.
-constexpr float kMinSeen = 0.6f;
-/// Contrast below which texture is rounding and noise, assumed: half a grey level of a hundred,
-/// averaged over the four pixels of a frame that a pixel here is made of.
-constexpr float kNoiseContrast = 0.0025f;
 constexpr int kMeanStride = 8;  // pixels looked at for motion_px, each way
 
 /// pixel_source = (z m x + b) / its last, for the homogeneous pixel x of the reference.
@@ -38,131 +35,77 @@ Warp warp_between(const PinholeGrid& reference, const PinholeGrid& source,
   return warp;
 }
 
-/// A row of the source's texture as the reference would see it on the surface; NaN where the source
-/// has none.
+/// p[0], p[1], q[0], q[1].
+Float4 two_and_two(const float* p, const float* q) {
+  const Float4 low = _mm_loadl_pi(_mm_setzero_ps(), reinterpret_cast<const __m64*>(p));
+  return _mm_loadh_pi(low, reinterpret_cast<const __m64*>(q));
+}
+
+Float4 truncated(Float4 v) { return _mm_cvtepi32_ps(_mm_cvttps_epi32(v)); }
+
+/// A row of the source's texture as the reference would see it on the surface, in strips of which
+/// the second begins at column `width`; NaN where the source has none.
 void warp_row(const Warp& warp, const cv::Mat& texture, const float* surface, float factor, int y,
-              int width, float* u, float* v, float* out) {
-  const float row = static_cast<float>(y) + 0.5f;
-  for (int x = 0; x < width; ++x) {
-    const float column = static_cast<float>(x) + 0.5f, z = surface[x] * factor;
-    const float w = z * (warp.m[2][0] * column + warp.m[2][1] * row + warp.m[2][2]) + warp.b[2];
-    const float inverse = 1.0f / w;
-    // Behind the source: outside its picture.
-    u[x] = w > 0.0f
-               ? (z * (warp.m[0][0] * column + warp.m[0][1] * row + warp.m[0][2]) + warp.b[0]) *
-                         inverse -
-                     0.5f
-               : -1.0f;
-    v[x] = (z * (warp.m[1][0] * column + warp.m[1][1] * row + warp.m[1][2]) + warp.b[1]) * inverse -
-           0.5f;
-  }
-  const float right = static_cast<float>(texture.cols - 1),
-              low = static_cast<float>(texture.rows - 1);
-  const std::size_t stride = texture.step1();
+              int width, float* out) {
+  const Float4 row = splat(static_cast<float>(y) + 0.5f), zero = _mm_setzero_ps();
+  const Float4 right = splat(static_cast<float>(texture.cols - 1));
+  const Float4 low = splat(static_cast<float>(texture.rows - 1));
+  const std::size_t step = texture.step1();
+  const Float4 stride = splat(static_cast<float>(step));
   const float* data = texture.ptr<float>();
+  const auto begin = [&](int k) { return static_cast<float>(k * width) + 0.5f; };
+  const Float4 first = _mm_setr_ps(begin(0), begin(1), begin(2), begin(3));
   for (int x = 0; x < width; ++x) {
-    if (!(u[x] >= 0.0f && v[x] >= 0.0f && u[x] < right && v[x] < low)) {
-      out[x] = kUnknown;
+    const Float4 column = splat(static_cast<float>(x)) + first;
+    const Float4 z = _mm_loadu_ps(surface + 4 * x) * splat(factor);
+    const auto along = [&](int r) {
+      return z * (splat(warp.m[r][0]) * column + splat(warp.m[r][1]) * row + splat(warp.m[r][2])) +
+             splat(warp.b[r]);
+    };
+    const Float4 w = along(2), inverse = splat(1.0f) / w;
+    const Float4 u = along(0) * inverse - splat(0.5f), v = along(1) * inverse - splat(0.5f);
+    // Behind the source is outside of its picture; comparisons with NaN fail.
+    const Float4 inside = _mm_and_ps(
+        _mm_and_ps(above(w, zero), _mm_and_ps(_mm_cmpge_ps(u, zero), _mm_cmpge_ps(v, zero))),
+        _mm_and_ps(above(right, u), above(low, v)));
+    if (!any(inside)) {
+      _mm_storeu_ps(out + 4 * x, splat(kUnknown));
       continue;
     }
-    const int left = static_cast<int>(u[x]), top = static_cast<int>(v[x]);
-    const float across = u[x] - static_cast<float>(left), down = v[x] - static_cast<float>(top);
-    const float* p = data + static_cast<std::size_t>(top) * stride + left;
-    const float* q = p + stride;
-    const float upper = p[0] + across * (p[1] - p[0]), lower = q[0] + across * (q[1] - q[0]);
-    out[x] = upper + down * (lower - upper);
+    // Whole numbers up to 2^24 are exact; none is negative, so that truncation is the floor.
+    const Float4 left = truncated(_mm_and_ps(inside, u)), top = truncated(_mm_and_ps(inside, v));
+    alignas(16) int begin_at[4];
+    _mm_store_si128(reinterpret_cast<__m128i*>(begin_at), _mm_cvttps_epi32(top * stride + left));
+    Float4 around[4];  // of each place: upper left, upper right, lower left, lower right
+    for (int k = 0; k < 4; ++k) {
+      const float* p = data + begin_at[k];
+      around[k] = two_and_two(p, p + step);
+    }
+    const Float4 across = _mm_and_ps(inside, u) - left, down = _mm_and_ps(inside, v) - top;
+    const Float4x4 c = transposed(around[0], around[1], around[2], around[3]);
+    const Float4 upper = c.x + across * (c.y - c.x);
+    const Float4 lower = c.z + across * (c.w - c.z);
+    _mm_storeu_ps(out + 4 * x, select(inside, upper + down * (lower - upper), splat(kUnknown)));
   }
 }
 
-/// Sums over windows of what correlation needs: a row's worth of column sums that moves down the
-/// picture.
-class WindowSums {
- public:
-  WindowSums(int width, int radius) : width_(width), radius_(radius) {
-    for (auto& sums : columns_) sums.assign(static_cast<std::size_t>(width), 0.0f);
-  }
-
-  /// Adds (sign 1) or takes away (-1) a row.
-  void add(const float* reference, const float* other, float sign) {
-    for (int x = 0; x < width_; ++x) {
-      const float a = reference[x], b = other[x];
-      const bool both = a == a && b == b;
-      const float one = both ? sign : 0.0f, ka = both ? a : 0.0f, kb = both ? b : 0.0f;
-      columns_[0][x] += one;
-      columns_[1][x] += one * ka;
-      columns_[2][x] += one * kb;
-      columns_[3][x] += one * ka * ka;
-      columns_[4][x] += one * kb * kb;
-      columns_[5][x] += one * ka * kb;
-    }
-  }
-
-  /// Correlation of the windows around the middle row.
-  void correlate(float* out) const {
-    std::array<float, kSums> s{};
-    const auto move = [&](int x, float sign) {
-      for (int i = 0; i < kSums; ++i) s[i] += sign * columns_[i][x];
-    };
-    const float side = static_cast<float>(2 * radius_ + 1), least = kMinSeen * side * side;
-    for (int x = 0; x < std::min(radius_, width_); ++x) move(x, 1.0f);
-    for (int x = 0; x < width_; ++x) {
-      if (x + radius_ < width_) move(x + radius_, 1.0f);
-      if (x - radius_ - 1 >= 0) move(x - radius_ - 1, -1.0f);
-      const float n = s[0];
-      if (!(n >= least)) {
-        out[x] = kUnknown;
-        continue;
-      }
-      const float inverse = 1.0f / n, noise = kNoiseContrast * kNoiseContrast * n;
-      const float aa = std::max(s[3] - s[1] * s[1] * inverse, 0.0f) + noise;
-      const float bb = std::max(s[4] - s[2] * s[2] * inverse, 0.0f) + noise;
-      out[x] = (s[5] - s[1] * s[2] * inverse) / std::sqrt(aa * bb);
-    }
-  }
-
- private:
-  static constexpr int kSums = 6;
-  int width_, radius_;
-  std::array<std::vector<float>, kSums> columns_;
-};
-
-/// Mean of the better half of the known values, at least two; NaN with fewer. Reorders them.
-float better_half(float* values, int count) {
-  int known = 0;
-  for (int i = 0; i < count; ++i)
-    if (values[i] == values[i]) values[known++] = values[i];
-  if (known < 2) return kUnknown;
-  const int half = std::max(2, (known + 1) / 2);
-  // Few values: sorting by insertion is the fastest.
-  for (int i = 1; i < known; ++i) {
-    const float value = values[i];
-    int j = i;
-    for (; j > 0 && values[j - 1] < value; --j) values[j] = values[j - 1];
-    values[j] = value;
-  }
-  float sum = 0.0f;
-  for (int i = 0; i < half; ++i) sum += values[i];
-  return sum / static_cast<float>(half);
-}
-
-/// Correlation of all pixels with one source at one place of the surface.
-void correlate(const StereoImage& reference, const StereoImage& source, const Warp& warp,
-               const cv::Mat& surface, float factor, int radius, cv::Mat& warped, cv::Mat& scores) {
-  const int width = reference.grid.width, height = reference.grid.height;
-  std::vector<float> u(static_cast<std::size_t>(width)), v(u.size());
-  WindowSums sums(width, radius);
-  const auto take = [&](int y, float sign) {
-    sums.add(reference.texture.ptr<float>(y), warped.ptr<float>(y), sign);
+/// Correlation of all places with one source at one place of the surface; all but the source's
+/// texture in strips.
+void correlate(const cv::Mat& reference, const cv::Mat& source, const Warp& warp,
+               const cv::Mat& surface, float factor, int radius, WindowCorrelation& windows,
+               cv::Mat& warped, cv::Mat& scores) {
+  const int height = reference.rows;
+  const auto row = [&](int y) {
+    return y >= 0 && y < height ? RowPair{reference.ptr<float>(y), warped.ptr<float>(y)}
+                                : windows.nowhere();
   };
+  windows.reset();
   for (int y = -radius; y < height; ++y) {
-    if (y + radius < height) {
-      warp_row(warp, source.texture, surface.ptr<float>(y + radius), factor, y + radius, width,
-               u.data(), v.data(), warped.ptr<float>(y + radius));
-      take(y + radius, 1.0f);
-    }
-    if (y < 0) continue;
-    if (y - radius - 1 >= 0) take(y - radius - 1, -1.0f);
-    sums.correlate(scores.ptr<float>(y));
+    if (y + radius < height)
+      warp_row(warp, source, surface.ptr<float>(y + radius), factor, y + radius, warped.cols,
+               warped.ptr<float>(y + radius));
+    windows.slide(row(y + radius), row(y - radius - 1));
+    if (y >= 0) windows.correlate(scores.ptr<float>(y));
   }
 }
 
@@ -193,25 +136,31 @@ ScoreVolume sweep(const StereoImage& reference, const std::vector<SweepSource>& 
   volume.size = reference.grid.size();
   volume.count = range.count();
   volume.scores.assign(static_cast<std::size_t>(volume.size.area()) * volume.count, kUnknown);
+  const cv::Mat texture = strips_of(reference.texture), wall = strips_of(surface);
   std::vector<Warp> warps;
   std::vector<cv::Mat> scores;
   for (const SweepSource& source : sources) {
     warps.push_back(warp_between(reference.grid, source.image->grid, source.source_from_reference));
-    scores.emplace_back(volume.size, CV_32F);
+    scores.emplace_back(texture.size(), CV_32FC4);
   }
-  cv::Mat warped(volume.size, CV_32F);
-  std::vector<float> values(sources.size());
+  cv::Mat warped(texture.size(), CV_32FC4);
+  WindowCorrelation windows(texture.cols, radius_px);
+  std::vector<const float*> rows(sources.size());
+  std::vector<cv::Vec4f> means(static_cast<std::size_t>(texture.cols));
   for (int k = -range.reach; k <= range.reach; ++k) {
     const auto factor = static_cast<float>(std::exp(range.step_ln * k));
     for (std::size_t s = 0; s < sources.size(); ++s)
-      correlate(reference, *sources[s].image, warps[s], surface, factor, radius_px, warped,
-                scores[s]);
-    for (int y = 0; y < volume.size.height; ++y)
-      for (int x = 0; x < volume.size.width; ++x) {
-        for (std::size_t s = 0; s < sources.size(); ++s) values[s] = scores[s].at<float>(y, x);
-        volume.at(x, y)[k + range.reach] =
-            better_half(values.data(), static_cast<int>(values.size()));
+      correlate(texture, sources[s].image->texture, warps[s], wall, factor, radius_px, windows,
+                warped, scores[s]);
+    for (int y = 0; y < volume.size.height; ++y) {
+      for (std::size_t s = 0; s < sources.size(); ++s) rows[s] = scores[s].ptr<float>(y);
+      better_half(rows, texture.cols, means.front().val);
+      for (int strip = 0; strip < 4; ++strip) {
+        const int begin = strip * texture.cols;
+        for (int x = begin; x < std::min(begin + texture.cols, volume.size.width); ++x)
+          volume.at(x, y)[k + range.reach] = means[x - begin][strip];
       }
+    }
   }
   return volume;
 }

@@ -1,0 +1,24 @@
+#pragma once
+// Long work, some of it at a time.
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cstddef>
+
+#include "core/progress.h"
+
+namespace rugae {
+
+/// Does it for each number below `count`, `lot` of them side by side, with a step of the progress
+/// line after each lot.
+template <typename Do>
+void do_in_lots(std::size_t count, std::size_t lot, Progress& progress, Do one) {
+  for (std::size_t begin = 0; begin < count; begin += lot) {
+    const std::size_t end = std::min(count, begin + lot);
+    tbb::parallel_for(begin, end, one);
+    progress.step(end - begin);
+  }
+}
+
+}  // namespace rugae
