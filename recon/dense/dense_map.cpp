@@ -30,9 +30,6 @@ constexpr std::size_t kCachedViews = 48;  // frames as stereo sees them: 0.7 MB 
 constexpr int kComparedMaps = 12;         // others that a depth map is held against
 /// Agreeing pixels in smaller groups than this are chance, of a depth map 400 px wide.
 constexpr double kSmallestIslandPx = 60.0;
-/// Beyond 60 degrees of incidence what spans a gap is more often a curtain from a fold's edge to
-/// what lies behind it than a wall.
-constexpr double kMinGapCosine = 0.5;
 /// Pieces with less than this share of the triangles of the largest piece are noise.
 constexpr double kSmallestPiece = 0.01;
 
@@ -158,11 +155,7 @@ void fill_gaps(const StillKeyframes& frames, const std::vector<StereoSet>& sets,
     if (!wall) return;
     const StereoViews seen(sets[i], [&](int k) { return views.coarsest(k); });
     filled[i] = look_again(*seen.reference, seen.sources, wall->depth, options, maps[i]);
-    const cv::Mat believed = (wall->sigma_share <= options.gap_sigma_share) &
-                             (wall->cosine >= kMinGapCosine) & ~(maps[i].depth > 0.0f);
-    wall->depth.copyTo(maps[i].depth, believed);
-    cv::Mat(wall->depth.mul(wall->sigma_share)).copyTo(maps[i].sigma, believed);
-    filled[i] |= believed;
+    filled[i] |= fill_from(*wall, options.gap_sigma_share, maps[i]);
   });
   keep_consistent(maps, filled, options);
 }

@@ -37,6 +37,9 @@ constexpr double kWidestStep = 2.0;  // inverse depth changes by this factor at 
 /// Pixels of a cell, each way: about half a window of the correlation, which sees nothing finer.
 constexpr int kCellPx = 4;
 constexpr int kCoarseCellPx = 8;  // of a first wall, where a solution costs an eighth
+/// Beyond 60 degrees of incidence what spans a gap is more often a curtain from a fold's edge to
+/// what lies behind it than a wall.
+constexpr double kMinGapCosine = 0.5;
 constexpr int kReach = 2, kSide = 2 * kReach + 1;  // cells that a cell is tied to
 
 /// One residual: linear in the inverse depths of a few cells.
@@ -273,6 +276,14 @@ std::optional<SmoothWall> smooth_wall(const DepthMap& map, const std::vector<Spa
   cv::sqrt(pixels_of(wall.variance(number), kCellPx, size), smooth.sigma_share);
   smooth.cosine = pixels_of(wall.cosine(map.grid), kCellPx, size);
   return smooth;
+}
+
+cv::Mat fill_from(const SmoothWall& wall, double sigma_share, DepthMap& map) {
+  const cv::Mat believed =
+      (wall.sigma_share <= sigma_share) & (wall.cosine >= kMinGapCosine) & ~(map.depth > 0.0f);
+  wall.depth.copyTo(map.depth, believed);
+  cv::Mat(wall.depth.mul(wall.sigma_share)).copyTo(map.sigma, believed);
+  return believed;
 }
 
 }  // namespace rugae

@@ -31,4 +31,8 @@ struct SmoothWall {
 std::optional<SmoothWall> smooth_wall(const DepthMap& map, const std::vector<SparseDepth>& points,
                                       const DepthPrior& prior, std::uint32_t number);
 
+/// Lets the wall stand for what the map leaves open, where it is known to `sigma_share` of its
+/// depth at least and seen within 60 degrees of its normal. Returns where (CV_8U).
+cv::Mat fill_from(const SmoothWall& wall, double sigma_share, DepthMap& map);
+
 }  // namespace rugae

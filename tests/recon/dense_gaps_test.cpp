@@ -108,6 +108,47 @@ TEST(SmoothWall, WrongPointsBesideTheGapHaveLittleSay) {
   EXPECT_NEAR(smooth->depth.at<float>(60, 80), kDistance, 0.01 * kDistance);
 }
 
+// A gap is filled, with what is right, as far as its wall is seen within 60 degrees, and no
+// further, though it is known there as well.
+TEST(SmoothWall, FillsGapsUnlessTheyAreSteep) {
+  constexpr double kKnown = 0.05, kHorizon = 10.0 * kDistance;
+  constexpr double kNearLimit = 0.03, kExact = 0.01;
+  int flat = 0, steep = 0;
+  for (const double tilt_rad : {0.7, 1.2}) {
+    const DenseWall wall =
+        plane_wall({0.0, std::sin(tilt_rad), std::cos(tilt_rad)}, 0.5 * kDistance);
+    // Up to its horizon.
+    const auto depth_on = [&](const PinholeGrid& grid) {
+      cv::Mat depth = true_depth(wall, Rigid3{}, grid);
+      depth.setTo(kHorizon, ~((depth > 0.0f) & (depth < kHorizon)));
+      return depth;
+    };
+    const cv::Mat truth = depth_on(small_grid());
+    const DepthPrior right{depth_on(halved(small_grid())), 0.3};
+    DepthMap map = map_of(truth);
+    const auto smooth = smooth_wall(map, {}, right, 0);
+    ASSERT_TRUE(smooth.has_value());
+    ASSERT_LT(cv::mean(smooth->sigma_share(kGap))[0], kKnown);
+    const DepthMap before{map.grid, map.cam_from_world, map.depth.clone(), map.sigma.clone()};
+    const cv::Mat filled = fill_from(*smooth, kKnown, map);
+    EXPECT_EQ(cv::countNonZero(filled), cv::countNonZero(filled(kGap)));
+    for (int y = kGap.y; y < kGap.br().y; ++y)
+      for (int x = kGap.x; x < kGap.br().x; ++x) {
+        const double cosine = wall.normal({}).dot(small_grid().ray(x, y).normalized());
+        if (std::abs(cosine - 0.5) < kNearLimit) continue;
+        ASSERT_EQ(filled.at<uchar>(y, x) > 0, cosine > 0.5) << x << " " << y << " " << cosine;
+        ++(cosine > 0.5 ? flat : steep);
+        if (cosine > 0.5) {
+          ASSERT_NEAR(map.depth.at<float>(y, x) / truth.at<float>(y, x), 1.0, kExact);
+          ASSERT_GT(map.sigma.at<float>(y, x), 0.0f);
+        }
+      }
+    EXPECT_EQ(cv::norm(map.depth, before.depth, cv::NORM_INF, before.depth > 0.0f), 0.0);
+  }
+  EXPECT_GT(flat, kGap.area());
+  EXPECT_GT(steep, kGap.area() / 2);
+}
+
 TEST(SmoothWall, NothingKnownOrNoPriorIsNoWall) {
   const cv::Mat truth = true_depth(plane_wall(Vec3::UnitZ(), kDistance), Rigid3{}, small_grid());
   DepthMap map = map_of(truth);
