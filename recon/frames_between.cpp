@@ -1,6 +1,7 @@
 #include "recon/frames_between.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 namespace rugae {
@@ -26,18 +27,36 @@ std::vector<int> without_pose(const std::vector<std::optional<Rigid3>>& poses) {
   return frames;
 }
 
+namespace {
+
+/// World_from_cam goes from that of one key frame to that of another at a steady pace, and on.
+Rigid3 steady_motion(const Structure& structure, int from, int to, int frame) {
+  const int a = structure.frames[from], b = structure.frames[to];
+  return interpolate(structure.cam_from_world[from].inverse(),
+                     structure.cam_from_world[to].inverse(),
+                     static_cast<double>(frame - a) / (b - a))
+      .inverse();
+}
+
+}  // namespace
+
 Between between(const Structure& structure, const std::vector<int>& placed, int frame) {
   const auto frame_of = [&](int k) { return structure.frames[k]; };
   const auto after = std::ranges::lower_bound(placed, frame, {}, frame_of);
   Between found;
   if (after != placed.begin()) found.keyframes.push_back(*(after - 1));
   if (after != placed.end()) found.keyframes.push_back(*after);
-  if (found.keyframes.size() < 2) return found;
+  if (found.keyframes.size() < 2) {
+    if (placed.size() < 2) return found;
+    const bool at_start = after == placed.begin();
+    const int outer = at_start ? placed[0] : placed.back();
+    const int inner = at_start ? placed[1] : placed[placed.size() - 2];
+    if (std::abs(frame - frame_of(outer)) <= std::abs(frame_of(outer) - frame_of(inner)))
+      found.beyond = steady_motion(structure, inner, outer, frame);
+    return found;
+  }
   const int a = frame_of(found.keyframes[0]), b = frame_of(found.keyframes[1]);
-  found.cam_from_world = interpolate(structure.cam_from_world[found.keyframes[0]].inverse(),
-                                     structure.cam_from_world[found.keyframes[1]].inverse(),
-                                     static_cast<double>(frame - a) / (b - a))
-                             .inverse();
+  found.cam_from_world = steady_motion(structure, found.keyframes[0], found.keyframes[1], frame);
   if (frame - a > b - frame) std::swap(found.keyframes[0], found.keyframes[1]);
   return found;
 }

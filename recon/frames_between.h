@@ -22,6 +22,9 @@ std::vector<int> without_pose(const std::vector<std::optional<Rigid3>>& poses);
 struct Between {
   std::vector<int> keyframes;            // before and after, the nearer one first; one at an end
   std::optional<Rigid3> cam_from_world;  // on the way from one to the other; empty at an end
+  /// At an end: where the motion between its two outermost key frames leads. Empty with one alone,
+  /// or farther on than they are apart.
+  std::optional<Rigid3> beyond;
 };
 
 /// `placed` as placed_keyframes() gives it, not empty.

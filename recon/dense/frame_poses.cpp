@@ -77,6 +77,7 @@ std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
     const CameraMotion& motion = motions[around.keyframes.front()];  // of the nearer one
     std::vector<MovingPose> guesses;
     if (around.cam_from_world) guesses.push_back({*around.cam_from_world, motion});
+    if (around.beyond) guesses.push_back({*around.beyond, motion});
     for (const int k : around.keyframes)
       guesses.push_back({structure.cam_from_world[k], motions[k]});
     return guesses;
