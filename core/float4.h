@@ -61,6 +61,12 @@ inline Float4x4 transposed(Float4 a, Float4 b, Float4 c, Float4 d) {
   return {a, b, c, d};
 }
 
+/// p[0], p[1], q[0], q[1].
+inline Float4 two_and_two(const float* p, const float* q) {
+  const Float4 low = _mm_loadl_pi(_mm_setzero_ps(), reinterpret_cast<const __m64*>(p));
+  return _mm_loadh_pi(low, reinterpret_cast<const __m64*>(q));
+}
+
 /// Whole part towards minus infinity (within 2^31) and what is left, 0 to 1.
 struct Floor {
   __m128i whole;

@@ -24,11 +24,8 @@ struct Neighbours {
   Float4 left, right;
 };
 Neighbours neighbours(const float* base, const int (&at)[kLanes]) {
-  const auto two = [&](int a, int b) {
-    const Float4 low = _mm_loadl_pi(_mm_setzero_ps(), reinterpret_cast<const __m64*>(base + a));
-    return _mm_loadh_pi(low, reinterpret_cast<const __m64*>(base + b));
-  };
-  const Float4 first = two(at[0], at[1]), last = two(at[2], at[3]);
+  const Float4 first = two_and_two(base + at[0], base + at[1]);
+  const Float4 last = two_and_two(base + at[2], base + at[3]);
   return {_mm_shuffle_ps(first, last, _MM_SHUFFLE(2, 0, 2, 0)),
           _mm_shuffle_ps(first, last, _MM_SHUFFLE(3, 1, 3, 1))};
 }

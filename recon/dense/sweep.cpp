@@ -35,12 +35,6 @@ Warp warp_between(const PinholeGrid& reference, const PinholeGrid& source,
   return warp;
 }
 
-/// p[0], p[1], q[0], q[1].
-Float4 two_and_two(const float* p, const float* q) {
-  const Float4 low = _mm_loadl_pi(_mm_setzero_ps(), reinterpret_cast<const __m64*>(p));
-  return _mm_loadh_pi(low, reinterpret_cast<const __m64*>(q));
-}
-
 Float4 truncated(Float4 v) { return _mm_cvtepi32_ps(_mm_cvttps_epi32(v)); }
 
 /// A row of the source's texture as the reference would see it on the surface, in strips of which

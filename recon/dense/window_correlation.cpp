@@ -50,8 +50,6 @@ cv::Mat strips_of(const cv::Mat& picture) {
 
 WindowCorrelation::WindowCorrelation(int width_of_strips, int radius_px)
     : width_(width_of_strips), radius_(radius_px) {
-  check(radius_px <= width_of_strips, "windows of {} px in a picture {} px wide", 2 * radius_px + 1,
-        4 * width_of_strips);
   unknown_.assign(4 * static_cast<std::size_t>(width_), kUnknown);
   columns_.resize(static_cast<std::size_t>(width_ + 2 * radius_));
   reset();
@@ -72,10 +70,11 @@ void WindowCorrelation::slide(const RowPair& in, const RowPair& out) {
 }
 
 void WindowCorrelation::correlate(float* scores) {
-  for (int x = 0; x < radius_; ++x)
+  for (int x = 0; x < radius_; ++x)  // outwards: a strip's width farther out is one strip more
     for (int i = 0; i < 6; ++i) {
-      columns_[x].of[i] = strips_before(columns_[x + width_].of[i]);
-      columns_[x + width_ + radius_].of[i] = next_strips(columns_[x + radius_].of[i]);
+      const int left = radius_ - 1 - x, right = radius_ + width_ + x;
+      columns_[left].of[i] = strips_before(columns_[left + width_].of[i]);
+      columns_[right].of[i] = next_strips(columns_[right - width_].of[i]);
     }
   Sums sums;
   std::ranges::fill(sums.of, _mm_setzero_ps());

@@ -23,7 +23,7 @@ struct RowPair {
 
 class WindowCorrelation {
  public:
-  /// Windows of 2 * radius_px + 1 pixels each way, at most as wide as a strip.
+  /// Windows of 2 * radius_px + 1 pixels each way.
   WindowCorrelation(int width_of_strips, int radius_px);
 
   /// Before the first row of a pair of pictures.
