@@ -18,6 +18,7 @@
 #include "studies/discard.h"
 #include "studies/make_cell.h"
 #include "studies/process.h"
+#include "studies/time_left.h"
 
 namespace rugae {
 namespace {
@@ -40,18 +41,6 @@ double free_memory_gb() {
 
 double pixels_of(const Camera& camera) {
   return static_cast<double>(camera.lens.width) * camera.lens.height;
-}
-
-// What a cell takes of the time, in pixels.
-double weight_of(const CellJob& job) {
-  constexpr double kOfAFrame = 1e5;  // what a frame costs beside its pixels
-  constexpr int kTrajectories = 6;   // in the paper
-  const Camera camera = load_camera(job.cell.camera);
-  const int asked = job.study->variants[job.cell.variant].simulate.frames;
-  const int whole = asked > 0 ? asked : camera.frames_in_paper / kTrajectories;
-  const int first = job.study->variants[job.cell.variant].simulate.first;
-  const int frames = first > 0 ? std::min(first, whole) : whole;
-  return frames * (pixels_of(camera) + kOfAFrame);
 }
 
 // What the cell will make that others may want as well.
@@ -78,27 +67,11 @@ struct Running {
   double memory_gb = 0.0;
 };
 
-// How long the rest will take, by what this run has made.
-class TimeLeft {
- public:
-  explicit TimeLeft(const std::vector<CellJob>& jobs) {
-    for (const CellJob& job : jobs) left_ += weight_of(job);
-  }
-  void done(const CellJob& job) {
-    left_ -= weight_of(job);
-    made_ += weight_of(job);
-  }
-  std::string text() const {
-    const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
-    const double minutes = seconds / made_ * left_ / 60.0;
-    return minutes < 1.5 ? fmt::format("{:.0f} s left", 60.0 * minutes)
-                         : fmt::format("{:.0f} min left", minutes);
-  }
-
- private:
-  double left_ = 0.0, made_ = 0.0;
-  Clock::time_point start_ = Clock::now();
-};
+std::string in_words(double seconds_left) {
+  const double minutes = seconds_left / 60.0;
+  return minutes < 1.5 ? fmt::format("{:.0f} s left", seconds_left)
+                       : fmt::format("{:.0f} min left", minutes);
+}
 
 class Workers {
  public:
@@ -111,9 +84,10 @@ class Workers {
 
   void run(std::vector<CellJob> waiting) {
     TimeLeft time_left(waiting);
+    const auto start = Clock::now();
     progress_.begin("cells", waiting.size());
     while (!waiting.empty() || !running_.empty()) {
-      start_what_fits(waiting);
+      start_what_fits(waiting, time_left);
       std::this_thread::sleep_for(kPoll);
       progress_.step(0);  // throws when a stop is wished; the processes end with `running_`
       for (auto at = running_.begin(); at != running_.end();) {
@@ -123,12 +97,15 @@ class Workers {
         }
         finish(*at);
         discard_finished(all_);
-        time_left.done(*at->job);
+        time_left.made(*at->job);
+        const double elapsed_s = std::chrono::duration<double>(Clock::now() - start).count();
         progress_.step();
-        progress_.say(
-            fmt::format("  {}: {:.0f} s, {:.1f} GB{}", at->job->cell.title(),
-                        at->process->ended().seconds, at->process->ended().peak_rss_mb / 1024.0,
-                        waiting.empty() && running_.size() == 1 ? "" : "; " + time_left.text()));
+        progress_.say(fmt::format("  {}: {:.0f} s, {:.1f} GB{}", at->job->cell.title(),
+                                  at->process->ended().seconds,
+                                  at->process->ended().peak_rss_mb / 1024.0,
+                                  waiting.empty() && running_.size() == 1
+                                      ? ""
+                                      : "; " + in_words(time_left.seconds_left(elapsed_s))));
         at = running_.erase(at);
       }
     }
@@ -136,11 +113,12 @@ class Workers {
   }
 
  private:
-  void start_what_fits(std::vector<CellJob>& waiting) {
+  void start_what_fits(std::vector<CellJob>& waiting, TimeLeft& time_left) {
     for (std::size_t i = 0;
          i < waiting.size() && static_cast<int>(running_.size()) < options_.jobs;) {
       if (waiting[i].files.finished() && is_free(shared_parts(waiting[i]))) {
         progress_.step();  // another cell of this run was the same
+        time_left.skipped(waiting[i]);
         waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(i));
         continue;
       }
