@@ -11,6 +11,7 @@
 #include "validate/align.h"
 #include "validate/metrics_json.h"
 #include "validate/surface_error.h"
+#include "validate/wall_seen.h"
 
 namespace rugae {
 namespace {
@@ -19,12 +20,12 @@ namespace {
 Visibility visibility_of(const CellView& view) {
   constexpr int kMostFrames = 150;
   const Truth& truth = view.truth;
-  Visibility visibility(truth.wall(), {});
   const int step = (truth.size() + kMostFrames - 1) / kMostFrames;
+  std::vector<int> frames;
   for (int i = 0; i < truth.size(); i += step)
-    if (has_label(view, "depth", i))
-      visibility.add(truth.camera().lens, truth.track()[i].world_from_camera, truth.depth_mm(i));
-  return visibility;
+    if (has_label(view, "depth", i)) frames.push_back(i);
+  Progress progress(Progress::Output::silent);
+  return wall_seen(truth, frames, progress);
 }
 
 // Triangles turned so that they face out of the organ, as the wall's do: seen by most of them,

@@ -6,11 +6,12 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "core/check.h"
 #include "dataset/image_io.h"
 #include "validate/metrics_json.h"
-#include "validate/visibility.h"
+#include "validate/wall_seen.h"
 
 namespace rugae {
 namespace {
@@ -128,22 +129,6 @@ json depth_errors(const Truth& truth, const EstimateLayout& layout, const PoseEr
   return {{"sim3", depth_json(mean_of(metric))}, {"median_scaled", depth_json(mean_of(by_median))}};
 }
 
-Visibility visibility_of(const Truth& truth, Progress& progress) {
-  Visibility visibility(truth.wall(), {});
-  for (int begin = 0; begin < truth.size(); begin += kFramesAtOnce) {
-    const int count = std::min(kFramesAtOnce, truth.size() - begin);
-    std::vector<cv::Mat> depths_mm(static_cast<std::size_t>(count));
-    tbb::parallel_for(0, count, [&](int i) {
-      depths_mm[static_cast<std::size_t>(i)] = truth.depth_mm(begin + i);
-    });
-    for (int i = 0; i < count; ++i)
-      visibility.add(truth.camera().lens, truth.track()[begin + i].world_from_camera,
-                     depths_mm[static_cast<std::size_t>(i)]);
-    progress.step(static_cast<std::size_t>(count));
-  }
-  return visibility;
-}
-
 json coverage_json(const Visibility& visibility) {
   const double wall = visibility.wall_area_mm2();
   const double seen = area_mm2(visibility.seen_wall());
@@ -225,7 +210,9 @@ json evaluate(const fs::path& dataset, const fs::path& estimate_folder, Progress
   progress.end();
 
   progress.begin("evaluate: wall seen", truth.size());
-  const Visibility visibility = visibility_of(truth, progress);
+  std::vector<int> frames(static_cast<std::size_t>(truth.size()));
+  std::iota(frames.begin(), frames.end(), 0);
+  const Visibility visibility = wall_seen(truth, frames, progress);
   out["coverage"] = coverage_json(visibility);
   progress.end();
 
