@@ -6,10 +6,10 @@
 
 #include "core/check.h"
 #include "core/files.h"
+#include "core/in_lots.h"
 #include "dataset/image_io.h"
 #include "recon/dense/dense_map.h"
 #include "recon/dense/moving_keyframes.h"
-#include "recon/in_lots.h"
 #include "recon/map.h"
 #include "recon/mosaic.h"
 #include "recon/pictures.h"

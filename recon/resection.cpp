@@ -7,11 +7,11 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
+#include "core/in_lots.h"
 #include "recon/bundle.h"
 #include "recon/cache.h"
 #include "recon/flow_guess.h"
 #include "recon/frames_between.h"
-#include "recon/in_lots.h"
 #include "recon/tracks.h"
 
 namespace rugae {

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "core/check.h"
+#include "core/in_lots.h"
 #include "dataset/image_io.h"
 #include "validate/metrics_json.h"
 #include "validate/wall_seen.h"
@@ -19,7 +20,7 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr int kFramesAtOnce = 16;  // whose depth is read side by side
+constexpr std::size_t kFramesAtOnce = 16;  // whose depth is read side by side
 
 // The tracked poses at the times of the truth: frames are the same by index, and must be so by
 // time.
@@ -107,25 +108,23 @@ json depth_errors(const Truth& truth, const EstimateLayout& layout, const PoseEr
     std::optional<DepthError> metric, by_median;
   };
   std::vector<DepthError> metric, by_median;
-  for (int begin = 0; begin < truth.size(); begin += kFramesAtOnce) {
-    const int count = std::min(kFramesAtOnce, truth.size() - begin);
-    std::vector<OfFrame> block(static_cast<std::size_t>(count));
-    tbb::parallel_for(0, count, [&](int i) {
-      const int frame = begin + i;
-      if (!fs::exists(layout.depth(frame))) return;
-      const cv::Mat estimated = read_exr(layout.depth(frame)), true_mm = truth.depth_mm(frame);
-      OfFrame& errors = block[static_cast<std::size_t>(i)];
-      if (poses.sim3)
-        errors.metric = depth_error(estimated, true_mm, poses.sim3->truth_from_estimate.scale);
-      if (const auto scale = median_scale(estimated, true_mm))
-        errors.by_median = depth_error(estimated, true_mm, *scale);
-    });
-    for (const OfFrame& errors : block) {  // means add up in the order of frames
-      if (errors.metric) metric.push_back(*errors.metric);
-      if (errors.by_median) by_median.push_back(*errors.by_median);
-    }
-    progress.step(static_cast<std::size_t>(count));
-  }
+  make_in_lots(
+      static_cast<std::size_t>(truth.size()), kFramesAtOnce, progress,
+      [&](std::size_t i) {
+        OfFrame errors;
+        const int frame = static_cast<int>(i);
+        if (!fs::exists(layout.depth(frame))) return errors;
+        const cv::Mat estimated = read_exr(layout.depth(frame)), true_mm = truth.depth_mm(frame);
+        if (poses.sim3)
+          errors.metric = depth_error(estimated, true_mm, poses.sim3->truth_from_estimate.scale);
+        if (const auto scale = median_scale(estimated, true_mm))
+          errors.by_median = depth_error(estimated, true_mm, *scale);
+        return errors;
+      },
+      [&](std::size_t, const OfFrame& errors) {  // means add up in the order of frames
+        if (errors.metric) metric.push_back(*errors.metric);
+        if (errors.by_median) by_median.push_back(*errors.by_median);
+      });
   return {{"sim3", depth_json(mean_of(metric))}, {"median_scaled", depth_json(mean_of(by_median))}};
 }
 

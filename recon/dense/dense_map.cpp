@@ -10,6 +10,7 @@
 #include <mutex>
 #include <opencv2/core.hpp>
 
+#include "core/in_lots.h"
 #include "recon/cache.h"
 #include "recon/dense/albedo.h"
 #include "recon/dense/consistency.h"
@@ -18,7 +19,6 @@
 #include "recon/dense/smooth_wall.h"
 #include "recon/dense/view_choice.h"
 #include "recon/dense/volume.h"
-#include "recon/in_lots.h"
 #include "recon/mesh_pieces.h"
 #include "recon/spread.h"
 
@@ -186,16 +186,11 @@ TriangleMesh fuse(const StillKeyframes& frames, const std::vector<StereoSet>& se
                   const std::vector<DepthMap>& maps, double voxel, Progress& progress) {
   progress.begin("fusion", maps.size());
   DistanceVolume volume(voxel);
-  for (std::size_t begin = 0; begin < maps.size(); begin += kAtOnce) {
-    const std::size_t end = std::min(maps.size(), begin + kAtOnce);
-    std::vector<cv::Mat> colours(end - begin);
-    tbb::parallel_for(begin, end, [&](std::size_t i) {
-      colours[i - begin] = frames.albedo(sets[i].reference, maps[i]);
-    });
-    // One after another: a voxel's mean depends on the order in its last bits.
-    for (std::size_t i = begin; i < end; ++i) volume.integrate(maps[i], colours[i - begin]);
-    progress.step(end - begin);
-  }
+  // One after another: a voxel's mean depends on the order in its last bits.
+  make_in_lots(
+      maps.size(), kAtOnce, progress,
+      [&](std::size_t i) { return frames.albedo(sets[i].reference, maps[i]); },
+      [&](std::size_t i, const cv::Mat& colours) { volume.integrate(maps[i], colours); });
   return volume.extract();
 }
 

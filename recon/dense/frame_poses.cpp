@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
+#include "core/in_lots.h"
 #include "recon/dense/moving_keyframes.h"
 #include "recon/dense/place_by_patches.h"
 #include "recon/frames_between.h"
-#include "recon/in_lots.h"
 
 namespace rugae {
 namespace {

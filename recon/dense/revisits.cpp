@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/in_lots.h"
 #include "recon/dense/moving_keyframes.h"
 #include "recon/dense/register_patch.h"
-#include "recon/in_lots.h"
 #include "recon/mask_at.h"
 #include "recon/resection.h"
 #include "recon/tracks.h"

@@ -29,7 +29,8 @@ constexpr int kLeastPixels = 4;       // of a cell's known ones
 constexpr int kLeastCells = 24;       // known: fewer say nothing of a wall
 constexpr double kCauchy = 2.0;       // residual, in sigmas, at which a term's weight has halved
 constexpr int kRounds = 4;
-/// Largest relative change of a round, anywhere: half of what is believed to be known at best.
+/// Largest relative change of a round, anywhere: half of the 0.6 % that a gap must be known to
+/// (DenseOptions::gap_sigma_share).
 constexpr double kConverged = 3e-3;
 constexpr int kDraws =
     4;  // averaged over 25 cells: sigma to a tenth; more cost more than they tell

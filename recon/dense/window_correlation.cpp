@@ -15,8 +15,8 @@ constexpr float kMinSeen = 0.6f;
 /// Contrast below which texture is rounding and noise, assumed: half a grey level of a hundred,
 /// averaged over the four pixels of a frame that a pixel here is made of.
 constexpr float kNoiseContrast = 0.0025f;
-constexpr std::size_t kMaxSources = 64;
-constexpr float kBelowAll = -2.0f;  // scores go from -1 to 1
+constexpr std::size_t kMaxSources = 64;  // twice what DenseOptions::views may be
+constexpr float kBelowAll = -2.0f;       // scores go from -1 to 1
 
 /// What each sum gets from one place; 0 where one of both is unknown.
 struct Products {
@@ -27,7 +27,7 @@ struct Products {
     const Float4 products[] = {_mm_and_ps(both, splat(1.0f)), a, b, a * a, b * b, a * b};
     std::ranges::copy(products, of);
   }
-  Float4 of[6];
+  Float4 of[kWindowSums];
 };
 
 Float4 next_strips(Float4 v) {
@@ -65,13 +65,13 @@ void WindowCorrelation::slide(const RowPair& in, const RowPair& out) {
   for (int x = 0; x < width_; ++x) {
     const Products more(in, x), less(out, x);
     Sums& column = columns_[x + radius_];
-    for (int i = 0; i < 6; ++i) column.of[i] = column.of[i] + more.of[i] - less.of[i];
+    for (int i = 0; i < kWindowSums; ++i) column.of[i] = column.of[i] + more.of[i] - less.of[i];
   }
 }
 
 void WindowCorrelation::correlate(float* scores) {
   for (int x = 0; x < radius_; ++x)  // outwards: a strip's width farther out is one strip more
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < kWindowSums; ++i) {
       const int left = radius_ - 1 - x, right = radius_ + width_ + x;
       columns_[left].of[i] = strips_before(columns_[left + width_].of[i]);
       columns_[right].of[i] = next_strips(columns_[right - width_].of[i]);
@@ -79,7 +79,7 @@ void WindowCorrelation::correlate(float* scores) {
   Sums sums;
   std::ranges::fill(sums.of, _mm_setzero_ps());
   const auto add = [&](const Sums& column) {
-    for (int i = 0; i < 6; ++i) sums.of[i] = sums.of[i] + column.of[i];
+    for (int i = 0; i < kWindowSums; ++i) sums.of[i] = sums.of[i] + column.of[i];
   };
   for (int x = 0; x < 2 * radius_; ++x) add(columns_[x]);
   const int side = 2 * radius_ + 1;
@@ -93,7 +93,7 @@ void WindowCorrelation::correlate(float* scores) {
     const Float4 bb = max(b2 - b * b * inverse, zero) + noise * n;
     const Float4 score = (ab - a * b * inverse) / root(aa * bb);
     _mm_storeu_ps(scores + 4 * x, select(_mm_cmpge_ps(n, least), score, splat(kUnknown)));
-    for (int i = 0; i < 6; ++i) sums.of[i] = sums.of[i] - columns_[x].of[i];
+    for (int i = 0; i < kWindowSums; ++i) sums.of[i] = sums.of[i] - columns_[x].of[i];
   }
 }
 

@@ -2,7 +2,6 @@
 // Zero-mean normalised correlation of two pictures' windows, by sums that slide down and across,
 // four places of the picture at once.
 
-#include <array>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -21,6 +20,8 @@ struct RowPair {
   const float* other = nullptr;
 };
 
+constexpr int kWindowSums = 6;  // of 1, a, b, a^2, b^2, a b
+
 class WindowCorrelation {
  public:
   /// Windows of 2 * radius_px + 1 pixels each way.
@@ -36,9 +37,9 @@ class WindowCorrelation {
   void correlate(float* scores);
 
  private:
-  /// Over a window or its part: of 1, a, b, a^2, b^2, a b.
+  /// Over a window or its part.
   struct Sums {
-    Float4 of[6];
+    Float4 of[kWindowSums];
   };
 
   int width_, radius_;
