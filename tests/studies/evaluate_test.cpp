@@ -8,6 +8,7 @@
 #include "core/files.h"
 #include "tests/studies/inside_sphere.h"
 #include "tests/studies/temporary_folder.h"
+#include "validate/wall_seen.h"
 
 namespace rugae {
 namespace {
@@ -68,6 +69,20 @@ TEST_F(Evaluate, AMapOneMillimetreTooLargeIsOneMillimetreOff) {
   EXPECT_NEAR(surface.at("completeness_mean_mm").get<double>(), 1.0, kFacets_mm);
   EXPECT_EQ(surface.at("f_at_0.5mm"), 0.0);
   EXPECT_EQ(surface.at("recall_at_2mm"), 1.0);
+}
+
+// Each frame by its own depth, whatever was read beside it.
+TEST_F(Evaluate, TheWallSeenIsThatOfEachFramesOwnDepth) {
+  inside_sphere::write_dataset(folder_ / "data");
+  const Truth truth = Truth::open(folder_ / "data");
+  Visibility one_by_one(truth.wall(), {});
+  std::vector<int> backwards;
+  for (int i = truth.size() - 1; i >= 0; --i) {
+    one_by_one.add(truth.camera().lens, truth.track()[i].world_from_camera, truth.depth_mm(i));
+    backwards.push_back(i);
+  }
+  Progress progress(Progress::Output::silent);
+  EXPECT_EQ(wall_seen(truth, backwards, progress).seen(), one_by_one.seen());
 }
 
 TEST_F(Evaluate, AnEstimateOfOtherFramesIsAnError) {
