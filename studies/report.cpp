@@ -8,6 +8,7 @@
 
 #include "core/check.h"
 #include "core/files.h"
+#include "core/in_lots.h"
 #include "core/presets.h"
 #include "dataset/image_io.h"
 #include "dataset/writer.h"
@@ -142,7 +143,7 @@ std::string chapter(const std::string& title, const std::string& intro, const st
          body + "</section>\n";
 }
 
-std::string cell_chapters(const CellView& view, ReportViews* views) {
+std::string cell_chapters(const CellView& view, const ReportViews* views) {
   const FramePictures pictures(view, shown_frames(view));
   const MapOverTruth over = map_over_truth(view);
   const std::string explore =
@@ -200,12 +201,13 @@ Estimate estimate_of(const CellResult& cell) {
   return cell.metrics.contains("failed") || !there ? Estimate{} : read_estimate(cell.estimate);
 }
 
-// How many cells the page shows in full.
-std::size_t detailed_cells(const std::vector<StudyPart>& parts) {
-  std::size_t count = 0;
+// Those that the study wants shown in full.
+std::vector<CellResult> detailed_cells(const std::vector<StudyPart>& parts) {
+  std::vector<CellResult> cells;
   for (const StudyPart& part : parts)
-    if (part.options.details && has_loop(part)) count += part.cells.size();
-  return count;
+    if (part.options.details && has_loop(part))
+      std::ranges::copy_if(part.cells, std::back_inserter(cells), has_frames);
+  return cells;
 }
 
 // The head of the page: of the first cell whose frames are there, one of the whole loop if any is.
@@ -232,23 +234,24 @@ void fill_head(const std::vector<StudyPart>& parts, std::map<std::string, std::s
   values["cards"] = loop && !many ? headline_cards(view) : "";
 }
 
-// The chapters of all cells that the study wants shown; those of a single one without a fold.
-std::string cells_part(const std::vector<StudyPart>& parts, ReportViews* views) {
+// The chapters of the cells; those of a single one without a fold.
+std::string cells_part(const std::vector<CellResult>& cells, bool many, const ReportViews* views,
+                       Progress& progress) {
+  constexpr std::size_t kAtATime = 4;  // each holds a wall, a map and their pictures
   std::string out;
-  const bool many = loop_cells(parts).size() > 1;
-  for (const StudyPart& part : parts) {
-    if (!part.options.details || !has_loop(part)) continue;
-    for (const CellResult& cell : part.cells) {
-      if (!has_frames(cell)) continue;
-      const Truth truth = Truth::open(cell.dataset);
-      const Estimate estimate = estimate_of(cell);
-      const CellView view{cell, truth, estimate, many};
-      if (!many) return cell_chapters(view, views);
-      out += fmt::format("<details class=\"cell\" id=\"{}\"><summary>{}</summary>\n",
-                         html::escape(cell.cell.name()), html::escape(cell.cell.title())) +
-             headline_cards(view) + cell_chapters(view, views) + "</details>\n";
-    }
-  }
+  make_in_lots(
+      cells.size(), kAtATime, progress,
+      [&](std::size_t i) {
+        const CellResult& cell = cells[i];
+        const Truth truth = Truth::open(cell.dataset);
+        const Estimate estimate = estimate_of(cell);
+        const CellView view{cell, truth, estimate, many};
+        if (!many) return cell_chapters(view, views);
+        return fmt::format("<details class=\"cell\" id=\"{}\"><summary>{}</summary>\n",
+                           html::escape(cell.cell.name()), html::escape(cell.cell.title())) +
+               headline_cards(view) + cell_chapters(view, views) + "</details>\n";
+      },
+      [&](std::size_t, const std::string& chapters) { out += chapters; });
   return out;
 }
 
@@ -273,7 +276,8 @@ std::string viewer_bundle() {
 
 }  // namespace
 
-std::string report_html(const Study& study, const std::vector<StudyPart>& parts) {
+std::string report_html(const Study& study, const std::vector<StudyPart>& parts,
+                        Progress& progress) {
   const std::vector<CellResult> cells = all_cells(parts);
   check(!cells.empty(), "report: a study without cells");
   const fs::path file = preset_root() / "viewer" / "report.html";
@@ -282,12 +286,16 @@ std::string report_html(const Study& study, const std::vector<StudyPart>& parts)
   values["title"] = html::escape(study.title);
   fill_head(parts, values);
   const std::string viewer = viewer_bundle();
-  ReportViews views(detailed_cells(parts));
-  values["cells"] = cells_part(parts, viewer.empty() ? nullptr : &views);
   values["viewer"] =
       viewer.empty() ? kNoViewer : "<script class=\"viewer\">" + viewer + "</script>";
   values["summaries"] = summaries_part(parts);
-  const std::vector<CellResult> loop = loop_cells(parts);
+  const std::vector<CellResult> loop = loop_cells(parts), detailed = detailed_cells(parts);
+  progress.begin("report", detailed.size());
+  ReportViews views(detailed.size());
+  if (!viewer.empty())
+    for (const CellResult& cell : detailed) views.add_wall(Truth::open(cell.dataset).wall());
+  values["cells"] = views.walls() + cells_part(detailed, loop.size() > 1,
+                                               viewer.empty() ? nullptr : &views, progress);
   values["overview"] = (loop.size() > 1 ? overview_part(loop) : "") + failures_part(cells);
   values["gates"] = gates_part(all_gates(parts));
   std::string texts = study.text;

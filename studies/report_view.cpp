@@ -29,13 +29,14 @@ constexpr std::size_t kMostTriangles = 60'000, kFewestTriangles = 5'000;
 constexpr std::size_t kMostStops = 90, kFewestStops = 8;
 constexpr int kQuality = 80;
 
-std::string hash_of(const TriangleMesh& mesh) {
+// Of the script with its geometry.
+std::string id_of(const TriangleMesh& mesh) {
   std::string bytes(reinterpret_cast<const char*>(mesh.vertices.data()),
                     mesh.vertices.size() * sizeof(Vec3));
   bytes.append(reinterpret_cast<const char*>(mesh.triangles.data()),
                mesh.triangles.size() * sizeof(Vec3i));
   constexpr std::size_t kLetters = 12;
-  return sha256_of_bytes(bytes).substr(0, kLetters);
+  return "wall-" + sha256_of_bytes(bytes).substr(0, kLetters);
 }
 
 Json pose_json(const Rigid3& world_from_camera) {
@@ -155,47 +156,53 @@ ReportViews::ReportViews(std::size_t cells)
       stops_(static_cast<int>(
           std::clamp(kStops / std::max<std::size_t>(cells, 1), kFewestStops, kMostStops))) {}
 
-std::string ReportViews::part(const CellView& view, const MapOverTruth& over,
-                              const FramePictures& pictures) {
+void ReportViews::add_wall(const TriangleMesh& wall) {
+  const std::string id = id_of(wall);
+  if (!walls_.contains(id)) walls_.emplace(id, simplified(wall, triangles_));
+}
+
+std::string ReportViews::walls() const {
   std::string out;
-  const TriangleMesh& full_wall = view.truth.wall();
-  const std::string hash = hash_of(full_wall);
-  auto known = walls_.find(hash);
-  if (known == walls_.end()) {
-    known = walls_.emplace(hash, Wall{"wall-" + hash, simplified(full_wall, triangles_)}).first;
-    Json geometry = packed::mesh(known->second.few);
-    geometry["id"] = known->second.id;
+  for (const auto& [id, few] : walls_) {
+    Json geometry = packed::mesh(few);
+    geometry["id"] = id;
     out += html::json_script("wall-data", geometry.dump());
   }
-  const Wall& wall = known->second;
+  return out;
+}
+
+std::string ReportViews::part(const CellView& view, const MapOverTruth& over,
+                              const FramePictures& pictures) const {
+  const TriangleMesh& full_wall = view.truth.wall();
+  const std::string wall_id = id_of(full_wall);
+  const TriangleMesh& wall = walls_.at(wall_id);
 
   const PathPlot path = path_plot(view);
   std::vector<double> time_s;
   for (const TimedPose& pose : view.truth.track()) time_s.push_back(pose.time_s);
-  Json data = {
-      {"title", view.cell.cell.title()},
-      {"wall",
-       {{"id", wall.id},
-        {"moves", fs::exists(DatasetLayout{view.cell.dataset}.wall_motion(0))},
-        {"seen", packed::shares(seen_vertices(over.visibility, full_wall, wall.few), 1.0)}}},
-      {"map", Json()},
-      {"error_colours", error_colours()},
-      {"corner_rays", corner_rays(view.truth.camera().lens)},
-      {"path",
-       {{"time_s", packed::floats(time_s)},
-        {"truth_mm", packed::points(path.truth_mm)},
-        {"estimate_mm", packed::points(path.estimate_mm)},
-        {"error_mm", packed::floats(path.error_mm)},
-        {"worst_mm", path.worst_mm}}},
-      {"labels", labels_json(view, pictures)},
-      {"stops", stops_json(view, pictures, stops_of(view.truth.size(), stops_))}};
+  Json data = {{"title", view.cell.cell.title()},
+               {"wall",
+                {{"id", wall_id},
+                 {"moves", fs::exists(DatasetLayout{view.cell.dataset}.wall_motion(0))},
+                 {"seen", packed::shares(seen_vertices(over.visibility, full_wall, wall), 1.0)}}},
+               {"map", Json()},
+               {"error_colours", error_colours()},
+               {"corner_rays", corner_rays(view.truth.camera().lens)},
+               {"path",
+                {{"time_s", packed::floats(time_s)},
+                 {"truth_mm", packed::points(path.truth_mm)},
+                 {"estimate_mm", packed::points(path.estimate_mm)},
+                 {"error_mm", packed::floats(path.error_mm)},
+                 {"worst_mm", path.worst_mm}}},
+               {"labels", labels_json(view, pictures)},
+               {"stops", stops_json(view, pictures, stops_of(view.truth.size(), stops_))}};
   if (over.has_map()) {
     const TriangleMesh few = simplified(over.map, triangles_);
     data["map"] = packed::mesh(few);
     data["map"]["error"] = packed::shares(carried(over.error_mm, over.map, few), over.worst_mm);
     data["map"]["worst_mm"] = over.worst_mm;
   }
-  return out + "<div class=\"view\">" + html::json_script("view-data", data.dump()) + "</div>\n";
+  return "<div class=\"view\">" + html::json_script("view-data", data.dump()) + "</div>\n";
 }
 
 }  // namespace rugae

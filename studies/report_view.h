@@ -17,19 +17,20 @@ class ReportViews {
  public:
   explicit ReportViews(std::size_t cells);
 
+  /// A wall that cells have; nothing happens if it is known. All come before the first part().
+  void add_wall(const TriangleMesh& wall);
+  /// HTML with the geometry of all walls.
+  std::string walls() const;
+
   /// HTML with the data as JSON, which the viewer turns into a view when its cell is opened. A cell
-  /// that failed has its truth alone.
-  std::string part(const CellView& view, const MapOverTruth& over, const FramePictures& pictures);
+  /// that failed has its truth alone. Cells may be asked for side by side.
+  std::string part(const CellView& view, const MapOverTruth& over,
+                   const FramePictures& pictures) const;
 
  private:
-  struct Wall {
-    std::string id;  // of the script with its geometry
-    TriangleMesh few;
-  };
-
-  std::size_t triangles_;              // of a mesh
-  int stops_;                          // frames with pictures
-  std::map<std::string, Wall> walls_;  // by a hash of their vertices
+  std::size_t triangles_;                      // of a mesh
+  int stops_;                                  // frames with pictures
+  std::map<std::string, TriangleMesh> walls_;  // simplified, by their ids
 };
 
 }  // namespace rugae

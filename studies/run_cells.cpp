@@ -139,9 +139,11 @@ class Workers {
 
   // One may always run, whatever it needs.
   bool may_start(const CellJob& job) const {
+    if (running_.empty()) return true;
+    if (job.study->alone || running_.front().job->study->alone) return false;
     double used_gb = memory_gb_of(job);
     for (const Running& r : running_) used_gb += r.memory_gb;
-    return running_.empty() || (used_gb <= options_.memory_gb && is_free(shared_parts(job)));
+    return used_gb <= options_.memory_gb && is_free(shared_parts(job));
   }
 
   fs::path log_of(const CellJob& job) const {
@@ -151,7 +153,8 @@ class Workers {
   void start(const CellJob& job) {
     make_folder(out_ / "logs");
     const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
-    const unsigned threads = std::max(1u, cores / static_cast<unsigned>(options_.jobs));
+    const unsigned at_a_time = job.study->alone ? 1u : static_cast<unsigned>(options_.jobs);
+    const unsigned threads = std::max(1u, cores / at_a_time);
     kept_.push_back(std::make_unique<CellJob>(job));
     const std::vector<std::string> command = {options_.program.string(),
                                               "run",

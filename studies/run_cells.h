@@ -28,9 +28,10 @@ struct CellJob {
 };
 
 /// Makes those that are not finished. Cells that share a dataset or a motion wait for the first of
-/// them, and what the study does not keep goes as soon as no cell needs it. A process that is
-/// killed (no memory) marks its cell as failed, the rest goes on, and the next run tries it again.
-/// Throws Error for input that will not do, and Interrupted.
+/// them, those of a study that says `alone` for all that is running, and what the study does not
+/// keep goes as soon as no cell needs it. A process that is killed (no memory) marks its cell as
+/// failed, the rest goes on, and the next run tries it again. Throws Error for input that will not
+/// do, and Interrupted.
 void run_cells(const std::vector<CellJob>& jobs, const std::filesystem::path& study_file,
                const std::filesystem::path& out, const RunOptions& options, Progress& progress);
 

@@ -63,10 +63,9 @@ StudyResult run_study(const fs::path& study_file, const fs::path& out, const Run
   if (seeds) write_atomic(out / "repeats.csv", repeats_csv(all_cells(parts)));
   for (const StudyPart& part : parts) write_tables(out / "tables", part);
   write_atomic(out / "junit.xml", junit_xml(study.title, all_gates(parts)));
-  progress.begin("report");
   StudyResult result;
   result.report = out / "report.html";
-  write_atomic(result.report, report_html(study, parts));
+  write_atomic(result.report, report_html(study, parts, progress));
   progress.end(result.report.string());
 
   for (const StudyPart& part : parts)

@@ -190,6 +190,7 @@ StudyOptions read_part_text(const std::string& text, const std::string& name) {
   study.text = text;
   yaml.get("title", study.title);
   yaml.get("details", study.details);
+  yaml.get("alone", study.alone);
   const Variant base = read_variant(yaml, name);
   read_names(yaml, "cameras", "camera", study.cameras);
   read_names(yaml, "trajectories", "trajectory", study.trajectories);

@@ -40,7 +40,7 @@ class Report : public TemporaryFolder {
     Progress progress(Progress::Output::silent);
     cell.metrics = evaluate(cell.dataset, cell.estimate, progress);
     cell.metrics["simulation"] = {{"frames_per_s", 12.0}, {"frames", 12}};
-    return report_html(study, {{study.parts[0], {cell}, {}, {}}});
+    return report_html(study, {{study.parts[0], {cell}, {}, {}}}, progress);
   }
 };
 
