@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <list>
 #include <mutex>
+#include <unordered_map>
 #include <utility>
 
 namespace rugae {
@@ -20,23 +21,35 @@ class Cache {
   T get(int index, Make make) {
     {
       const std::lock_guard lock(mutex_);
-      for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
-        if (entry->first != index) continue;
-        entries_.splice(entries_.begin(), entries_, entry);
+      if (const auto at = places_.find(index); at != places_.end()) {
+        entries_.splice(entries_.begin(), entries_, at->second);
         return entries_.front().second;
       }
     }
     T value = make();
     const std::lock_guard lock(mutex_);
+    if (places_.contains(index)) return value;
     entries_.emplace_front(index, value);
-    if (entries_.size() > capacity_) entries_.pop_back();
+    places_[index] = entries_.begin();
+    if (entries_.size() > capacity_) {
+      places_.erase(entries_.back().first);
+      entries_.pop_back();
+    }
     return value;
   }
 
+  void clear() {
+    const std::lock_guard lock(mutex_);
+    places_.clear();
+    entries_.clear();
+  }
+
  private:
+  using Entries = std::list<std::pair<int, T>>;  // newest first
   std::size_t capacity_;
   std::mutex mutex_;
-  std::list<std::pair<int, T>> entries_;  // newest first
+  Entries entries_;
+  std::unordered_map<int, typename Entries::iterator> places_;
 };
 
 }  // namespace rugae

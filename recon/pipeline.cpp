@@ -120,6 +120,7 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
   const EstimateLayout layout{out};
   make_folder(out);
   progress.end();
+  frames.release();
   const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());  // of the caller
   const Structure& structure = motion.structure;
 

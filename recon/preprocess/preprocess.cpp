@@ -1,5 +1,7 @@
 #include "recon/preprocess/preprocess.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -16,7 +18,15 @@ namespace {
 constexpr int kVignettingFrames = 16;  // spread over the sequence
 constexpr int kProfileSamples = 257;   // of the published profile
 constexpr std::size_t kCachedFrames = 6;
-constexpr std::size_t kCachedGrays = 24;
+constexpr std::size_t kCachedRaws = 24;  // as many as are looked ahead for key frames, and more
+// Of gray frames, and of reflections: both are wanted again by each stage of the path. A thousand
+// frames of 640 x 480.
+constexpr std::size_t kHeldBytes = std::size_t{300} << 20;
+
+std::size_t held_of(const Lens& lens) {
+  const auto bytes = static_cast<std::size_t>(lens.width) * lens.height;
+  return std::max(kCachedRaws, kHeldBytes / bytes);
+}
 
 }  // namespace
 
@@ -30,11 +40,16 @@ struct FrameSource::Impl {
   cv::Mat valid;
   cv::Mat gain;  // 1 / V; empty when switched off
   std::vector<double> profile;
-  Cache<Frame> frames{kCachedFrames}, pose_frames{kCachedFrames}, map_frames{kCachedFrames};
-  Cache<cv::Mat> grays{kCachedGrays};
+  Cache<Frame> frames{kCachedFrames}, map_frames{kCachedFrames};
+  Cache<cv::Mat> raws{kCachedRaws};  // gray, as observed
+  Cache<cv::Mat> grays, reflections;
 
   Impl(const Observations& source, const PreprocessOptions& chosen)
-      : observations(source), options(chosen), lens(source.lens()) {
+      : observations(source),
+        options(chosen),
+        lens(source.lens()),
+        grays(held_of(lens)),
+        reflections(held_of(lens)) {
     options.check();
     const Lens& original = observations.lens();
     field = cv::Mat(original.height, original.width, CV_8U, cv::Scalar(0));
@@ -61,20 +76,25 @@ struct FrameSource::Impl {
   cv::Mat correct(const cv::Mat& image) const {
     return gain.empty() ? image : apply_gain(image, gain);
   }
-  cv::Mat gray_of(const cv::Mat& bgr) const {
-    cv::Mat gray;
-    cv::cvtColor(bgr, gray, cv::COLOR_BGR2GRAY);
-    return gray;
+  cv::Mat raw(int index) {
+    return raws.get(index, [&] {
+      cv::Mat gray;
+      cv::cvtColor(observations.image(index), gray, cv::COLOR_BGR2GRAY);
+      return gray;
+    });
+  }
+  cv::Mat detected(int index) { return detect_reflections(raw(index), options.reflections, field); }
+  cv::Mat reflection(int index) {
+    return reflections.get(index, [&] { return move_mask(detected(index)); });
   }
 
   void estimate_gain() {
-    std::vector<cv::Mat> images, usable;
-    for (const int index : vignetting_frames(observations.size())) {
-      const cv::Mat gray = gray_of(observations.image(index));
-      images.push_back(move(gray));
-      const cv::Mat reflection = move_mask(detect_reflections(gray, options.reflections, field));
-      usable.push_back(valid & ~reflection);
-    }
+    const std::vector<int> indices = vignetting_frames(observations.size());
+    std::vector<cv::Mat> images(indices.size()), usable(indices.size());
+    tbb::parallel_for(std::size_t{0}, indices.size(), [&](std::size_t i) {
+      images[i] = move(raw(indices[i]));
+      usable[i] = valid & ~reflection(indices[i]);
+    });
     const double reach_px = 0.5 * std::hypot(lens.width, lens.height);
     const VignettingProfile found =
         estimate_vignetting(images, usable, {lens.cx, lens.cy}, reach_px);
@@ -83,29 +103,20 @@ struct FrameSource::Impl {
       profile.push_back(found.at(reach_px * k / (kProfileSamples - 1.0)));
   }
 
-  cv::Mat make_gray(int index) const {
-    cv::Mat gray = gray_of(observations.image(index));
-    if (options.reflections.suppress_for_pose)
-      gray = suppress_reflections(gray, detect_reflections(gray, options.reflections, field),
-                                  options.reflections);
-    return correct(move(gray));
+  cv::Mat gray(int index) {
+    return grays.get(index, [&] {
+      cv::Mat gray = raw(index);
+      if (options.reflections.suppress_for_pose)
+        gray = suppress_reflections(gray, detected(index), options.reflections);
+      return correct(move(gray));
+    });
   }
 
-  Frame make_frame(int index, bool for_pose, bool for_map) const {
-    const cv::Mat bgr = observations.image(index);
-    const cv::Mat gray = gray_of(bgr);
-    const cv::Mat reflection = detect_reflections(gray, options.reflections, field);
-    const ReflectionOptions& chosen = options.reflections;
-    Frame frame{index, {}, {}, {}, valid};
-    if (for_pose) {
-      frame.gray = correct(
-          move(chosen.suppress_for_pose ? suppress_reflections(gray, reflection, chosen) : gray));
-      frame.reflection = move_mask(reflection);
-    }
-    if (for_map)
-      frame.map_bgr = correct(
-          move(chosen.suppress_for_map ? suppress_reflections(bgr, reflection, chosen) : bgr));
-    return frame;
+  cv::Mat map_bgr(int index) {
+    cv::Mat bgr = observations.image(index);
+    if (options.reflections.suppress_for_map)
+      bgr = suppress_reflections(bgr, detected(index), options.reflections);
+    return correct(move(bgr));
   }
 };
 
@@ -134,23 +145,38 @@ const cv::Mat& FrameSource::valid() const { return impl_->valid; }
 const std::vector<double>& FrameSource::vignetting_profile() const { return impl_->profile; }
 
 Frame FrameSource::frame(int index) const {
-  check(index >= 0 && index < size(), "frame {} of {}: no such frame", index, size());
-  return impl_->frames.get(index, [&] { return impl_->make_frame(index, true, true); });
+  check_index(index);
+  return impl_->frames.get(index, [&] {
+    return Frame{index, impl_->gray(index), impl_->map_bgr(index), impl_->reflection(index),
+                 impl_->valid};
+  });
 }
 
 Frame FrameSource::pose_frame(int index) const {
-  check(index >= 0 && index < size(), "frame {} of {}: no such frame", index, size());
-  return impl_->pose_frames.get(index, [&] { return impl_->make_frame(index, true, false); });
+  check_index(index);
+  return {index, impl_->gray(index), {}, impl_->reflection(index), impl_->valid};
 }
 
 Frame FrameSource::map_frame(int index) const {
-  check(index >= 0 && index < size(), "frame {} of {}: no such frame", index, size());
-  return impl_->map_frames.get(index, [&] { return impl_->make_frame(index, false, true); });
+  check_index(index);
+  return impl_->map_frames.get(index, [&] {
+    return Frame{index, {}, impl_->map_bgr(index), {}, impl_->valid};
+  });
 }
 
 cv::Mat FrameSource::gray(int index) const {
+  check_index(index);
+  return impl_->gray(index);
+}
+
+void FrameSource::release() const {
+  impl_->raws.clear();
+  impl_->grays.clear();
+  impl_->reflections.clear();
+}
+
+void FrameSource::check_index(int index) const {
   check(index >= 0 && index < size(), "frame {} of {}: no such frame", index, size());
-  return impl_->grays.get(index, [&] { return impl_->make_gray(index); });
 }
 
 }  // namespace rugae

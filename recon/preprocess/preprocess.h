@@ -26,9 +26,10 @@ struct Frame {
 /// The frames of a sequence from which the vignetting profile is estimated: sixteen, spread evenly.
 std::vector<int> vignetting_frames(int size);
 
-/// Reads and preprocesses frames on demand (memory does not grow with their number; a small cache
-/// holds the latest). Calls are thread-safe. De-vignetting: the profile is estimated once, from
-/// frames spread over the sequence; without frames there is none.
+/// Reads and preprocesses frames on demand and holds the latest: up to 600 MB of what poses are
+/// made of, however many frames there are. Images are shared with the caller, who leaves them as
+/// they are. Calls are thread-safe. De-vignetting: the profile is estimated once, from frames
+/// spread over the sequence; without frames there is none.
 class FrameSource {
  public:
   FrameSource(const Observations& observations, const PreprocessOptions& options);
@@ -58,11 +59,15 @@ class FrameSource {
   Frame map_frame(int index) const;
   /// Only `gray`: what key frame selection needs.
   cv::Mat gray(int index) const;
+  /// Forgets the images that are held: the path is known, and what comes needs the memory.
+  void release() const;
   /// B(r): the estimated vignetting profile, V at r = 0 .. 1 in equal steps (1 = half the
   /// diagonal); empty when switched off.
   const std::vector<double>& vignetting_profile() const;
 
  private:
+  void check_index(int index) const;  // throws Error
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
