@@ -79,6 +79,7 @@ json info_of(const Estimate& estimate) {
           {"lost", count(estimate, FrameState::lost)},
           {"numbers", estimate.numbers},
           {"stages", stages},
+          {"path_s", estimate.path_s},
           {"options", options},
           {"units", units}};
 }
@@ -98,6 +99,7 @@ void read_numbers(const fs::path& file, Estimate& estimate) {
     for (const json& stage : object.at("stages"))
       estimate.stages.push_back({stage.at("name").get<std::string>(), number(stage.at("seconds")),
                                  number(stage.at("peak_rss_mb"))});
+    estimate.path_s = number(object.at("path_s"));
     estimate.options_json = object.at("options").dump();
     const json& units = object.at("units");
     if (units.at("length") == "mm")

@@ -40,6 +40,7 @@ struct Estimate {
   TriangleMesh map;
   std::vector<Vec3> points;  // sparse
   std::vector<StageTime> stages;
+  double path_s = 0.0;  // of these, until every pose was known; the rest is the map's
   std::map<std::string, double>
       numbers;  // counts and errors a reader wants: keyframes, tracks, mean_reprojection_px, ...
   std::string options_json;

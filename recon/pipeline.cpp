@@ -64,6 +64,7 @@ Estimate estimate_of(const Observations& observations, const ReconOptions& optio
   e.options_json = to_json_text(options);
   e.lens = observations.lens();
   e.scale_sigma_share = structure.scale_sigma_share;
+  for (const StageTime& stage : motion.stages) e.path_s += stage.seconds;
   e.states.assign(poses.size(), FrameState::lost);
   e.world_from_camera.assign(poses.size(), Rigid3{});
   for (std::size_t i = 0; i < poses.size(); ++i) {

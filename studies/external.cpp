@@ -120,6 +120,7 @@ void reconstruct_by(const ExternalMethod& method, const fs::path& dataset,
   Estimate made = estimate_from(results, observations);
   made.method = method.name;
   made.stages = {{method.name, ended.seconds, ended.peak_rss_mb}};
+  made.path_s = ended.seconds;
   write_estimate(estimate, made);
   progress.end(fmt::format("{} of {} frames", made.track().size(), observations.size()));
 }

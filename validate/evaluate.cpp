@@ -57,14 +57,17 @@ json time_json(const Estimate& estimate) {
   for (const StageTime& stage : estimate.stages) {
     stages.push_back(
         {{"name", stage.name}, {"seconds", stage.seconds}, {"peak_rss_mb", stage.peak_rss_mb}});
-    stage_s[stage.name] = stage.seconds;
+    stage_s[stage.name] = stage_s.value(stage.name, 0.0) + stage.seconds;  // some come twice
     seconds += stage.seconds;
     peak_mb = std::max(peak_mb, stage.peak_rss_mb);
   }
   const auto frames = static_cast<double>(estimate.states.size());
+  const auto a_second = [frames](double s) { return s > 0.0 ? json(frames / s) : json(); };
   return {{"reconstruct_s", seconds},
           {"pair_s", frames > 1.0 ? json(seconds / (frames - 1.0)) : json()},
-          {"frames_per_s", seconds > 0.0 ? json(frames / seconds) : json()},
+          {"frames_per_s", a_second(seconds)},
+          {"path_s", estimate.path_s},
+          {"path_frames_per_s", a_second(estimate.path_s)},
           {"peak_rss_mb", peak_mb},
           {"stage_s", stage_s},
           {"stages", stages}};

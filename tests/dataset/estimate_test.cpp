@@ -33,6 +33,7 @@ Estimate example() {
   estimate.map.sigma = {0.25f, 0.5f, 1.0f};
   estimate.points = {Vec3(0.1, 0.2, 0.3), Vec3(-1e-9, 1e9, 1.0 / 3.0)};
   estimate.stages = {{"keyframes", 1.25, 100.0}, {"bundle", 2.5, 120.5}};
+  estimate.path_s = 3.75;
   estimate.numbers = {
       {"keyframes", 2.0}, {"mean_reprojection_px", 0.123456789012345678}, {"unknown", NAN}};
   estimate.options_json = R"({"method":"paper","seed":1})";
@@ -66,6 +67,7 @@ TEST(Estimate, RoundTrip) {
   EXPECT_EQ(b.stages[1].name, "bundle");
   EXPECT_EQ(b.stages[1].seconds, 2.5);
   EXPECT_EQ(b.stages[1].peak_rss_mb, 120.5);
+  EXPECT_EQ(b.path_s, 3.75);
   EXPECT_EQ(b.numbers.at("mean_reprojection_px"), a.numbers.at("mean_reprojection_px"));
   EXPECT_TRUE(std::isnan(b.numbers.at("unknown")));
   EXPECT_EQ(b.options_json, a.options_json);

@@ -110,6 +110,9 @@ TEST_F(Pipeline, TheMapIsMadeFromAMotionOnDisk) {
             read_text(halves / "pictures" / "inliers" / pair));
   EXPECT_EQ(in_halves.stages.front().name, motion.stages.front().name);
   EXPECT_EQ(in_halves.stages.back().name, "pictures");
+  double motion_s = 0.0;
+  for (const StageTime& stage : motion.stages) motion_s += stage.seconds;
+  EXPECT_EQ(in_halves.path_s, motion_s);
 
   EXPECT_FALSE(motion.structure.scale_sigma_share.has_value());
   Motion in_mm = motion;

@@ -48,6 +48,9 @@ TEST_F(Evaluate, TheTruthInAnotherWorldHasNoErrorButItsLostFrame) {
   EXPECT_EQ(surface.at("recall_at_0.25mm"), 1.0);
   EXPECT_EQ(m.at("time").at("reconstruct_s"), 2.0);
   EXPECT_EQ(m.at("time").at("frames_per_s"), 6.0);
+  EXPECT_EQ(m.at("time").at("path_s"), 1.5);
+  EXPECT_EQ(m.at("time").at("path_frames_per_s"), 8.0);
+  EXPECT_EQ(m.at("time").at("stage_s").at("adjustment"), 1.5);  // both
   EXPECT_EQ(m.at("time").at("peak_rss_mb"), 200.0);
 
   const json& frames = m.at("frames");  // for plots: gaps where frames were lost

@@ -109,7 +109,8 @@ inline void write_estimate_of_truth(const std::filesystem::path& root, double un
   estimate.method = "paper";
   estimate.lens = camera().lens;
   estimate.options_json = "{}";
-  estimate.stages = {{"key frames", 1.5, 100.0}, {"map", 0.5, 200.0}};
+  estimate.stages = {{"adjustment", 1.0, 90.0}, {"adjustment", 0.5, 100.0}, {"map", 0.5, 200.0}};
+  estimate.path_s = 1.5;
   estimate.numbers = {{"keyframes", 4.0}};
   const PoseTrack poses = track();
   for (int i = 0; i < kFrames; ++i) {
