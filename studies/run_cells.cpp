@@ -15,6 +15,7 @@
 #include "cameras/camera.h"
 #include "core/check.h"
 #include "core/files.h"
+#include "recon/preprocess/preprocess.h"
 #include "studies/discard.h"
 #include "studies/make_cell.h"
 #include "studies/process.h"
@@ -211,9 +212,22 @@ void RunOptions::check() const {
                memory_gb);
 }
 
+int frames_of(const CellJob& job) {
+  constexpr int kTrajectories = 6;  // in the paper
+  const auto& simulate = job.study->variants[job.cell.variant].simulate;
+  const int whole = simulate.frames > 0
+                        ? simulate.frames
+                        : load_camera(job.cell.camera).frames_in_paper / kTrajectories;
+  return simulate.first > 0 ? std::min(simulate.first, whole) : whole;
+}
+
 double memory_gb_of(const CellJob& job) {
-  constexpr double kFixedGb = 0.4, kGbAPixel = 1.6e-6;
-  return kFixedGb + kGbAPixel * pixels_of(load_camera(job.cell.camera));
+  constexpr double kFixedGb = 0.4, kGbAPixel = 1.6e-6, kBytesInGb = 1e9;
+  constexpr double kHeldBytesAPixel = 2.0;  // of each frame, by FrameSource
+  const double pixels = pixels_of(load_camera(job.cell.camera));
+  const double held = std::min(static_cast<double>(FrameSource::kMostHeldBytes),
+                               kHeldBytesAPixel * pixels * frames_of(job));
+  return kFixedGb + kGbAPixel * pixels + held / kBytesInGb;
 }
 
 void run_cells(const std::vector<CellJob>& jobs, const fs::path& study_file, const fs::path& out,

@@ -35,8 +35,10 @@ struct CellJob {
 void run_cells(const std::vector<CellJob>& jobs, const std::filesystem::path& study_file,
                const std::filesystem::path& out, const RunOptions& options, Progress& progress);
 
+/// Of its dataset; about as many where the paper's number is asked for.
+int frames_of(const CellJob& job);
 /// What a cell will need at most, measured on cameras of 250 x 250 to 1280 x 720 px: grows with
-/// the pixels of a frame.
+/// the pixels of a frame, and up to a bound with their number.
 double memory_gb_of(const CellJob& job);
 
 }  // namespace rugae

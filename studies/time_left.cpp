@@ -1,6 +1,5 @@
 #include "studies/time_left.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <limits>
 #include <set>
@@ -14,14 +13,10 @@ namespace {
 /// 95 are rendering, 100 the motion, 90 map and measures. A single stage takes some 15.
 constexpr double kRendering = 0.33, kMotion = 0.35, kMap = 0.32, kStage = 0.05;
 constexpr double kOfAFrame = 1e5;  // what a frame costs beside its pixels, in pixels
-constexpr int kTrajectories = 6;   // in the paper
 
 double pixels_of(const CellJob& job) {
   const Camera camera = load_camera(job.cell.camera);
-  const auto& simulate = job.study->variants[job.cell.variant].simulate;
-  const int whole = simulate.frames > 0 ? simulate.frames : camera.frames_in_paper / kTrajectories;
-  const int frames = simulate.first > 0 ? std::min(simulate.first, whole) : whole;
-  return frames * (static_cast<double>(camera.lens.width) * camera.lens.height + kOfAFrame);
+  return frames_of(job) * (static_cast<double>(camera.lens.width) * camera.lens.height + kOfAFrame);
 }
 
 }  // namespace

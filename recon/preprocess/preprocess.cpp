@@ -19,13 +19,11 @@ constexpr int kVignettingFrames = 16;  // spread over the sequence
 constexpr int kProfileSamples = 257;   // of the published profile
 constexpr std::size_t kCachedFrames = 6;
 constexpr std::size_t kCachedRaws = 24;  // as many as are looked ahead for key frames, and more
-// Of gray frames, and of reflections: both are wanted again by each stage of the path. A thousand
-// frames of 640 x 480.
-constexpr std::size_t kHeldBytes = std::size_t{300} << 20;
 
+// Gray frames, and as many reflections: both are wanted again by each stage of the path.
 std::size_t held_of(const Lens& lens) {
   const auto bytes = static_cast<std::size_t>(lens.width) * lens.height;
-  return std::max(kCachedRaws, kHeldBytes / bytes);
+  return std::max(kCachedRaws, FrameSource::kMostHeldBytes / (2 * bytes));
 }
 
 }  // namespace

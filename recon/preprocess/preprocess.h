@@ -26,12 +26,15 @@ struct Frame {
 /// The frames of a sequence from which the vignetting profile is estimated: sixteen, spread evenly.
 std::vector<int> vignetting_frames(int size);
 
-/// Reads and preprocesses frames on demand and holds the latest: up to 600 MB of what poses are
-/// made of, however many frames there are. Images are shared with the caller, who leaves them as
-/// they are. Calls are thread-safe. De-vignetting: the profile is estimated once, from frames
+/// Reads and preprocesses frames on demand and holds the latest: up to kMostHeldBytes of what poses
+/// are made of, however many frames there are. Images are shared with the caller, who leaves them
+/// as they are. Calls are thread-safe. De-vignetting: the profile is estimated once, from frames
 /// spread over the sequence; without frames there is none.
 class FrameSource {
  public:
+  /// A thousand frames of 640 x 480.
+  static constexpr std::size_t kMostHeldBytes = 600'000'000;
+
   FrameSource(const Observations& observations, const PreprocessOptions& options);
   ~FrameSource();
 
