@@ -1,5 +1,7 @@
 #include "recon/preprocess/undistort.h"
 
+#include <tbb/parallel_for.h>
+
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -23,7 +25,7 @@ bool within_stop(const Lens& lens, const Vec2& pixel) {
 Undistortion::Undistortion(const Lens& from, const Lens& to)
     : valid_(to.height, to.width, CV_8U, cv::Scalar(0)) {
   cv::Mat source_px(to.height, to.width, CV_32FC2);
-  for (int y = 0; y < to.height; ++y) {
+  tbb::parallel_for(0, to.height, [&](int y) {
     auto* row = source_px.ptr<cv::Vec2f>(y);
     for (int x = 0; x < to.width; ++x) {
       row[x] = {kNowherePx, kNowherePx};
@@ -37,7 +39,7 @@ Undistortion::Undistortion(const Lens& from, const Lens& to)
           pixel->x() >= low && pixel->x() <= right && pixel->y() >= low && pixel->y() <= bottom;
       if (inside && within_stop(from, *pixel)) valid_.at<unsigned char>(y, x) = 255;
     }
-  }
+  });
   cv::convertMaps(source_px, {}, source_px_, source_step_, CV_16SC2);
 }
 
