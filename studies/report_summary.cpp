@@ -87,9 +87,8 @@ std::string curve_html(const SummaryCurve& curve) {
     }
     if (line.breaks_between) {
       plot.marks.push_back({line.breaks_between->second, series.name + " is broken"});
-      breaks += fmt::format("<b>{}</b> breaks between {} and {}. ", html::escape(series.name),
-                            html::number(line.breaks_between->first, 4),
-                            html::number(line.breaks_between->second, 4));
+      breaks += fmt::format("<b>{}</b> breaks between {:g} and {:g}. ", html::escape(series.name),
+                            line.breaks_between->first, line.breaks_between->second);
     }
     plot.series.push_back(std::move(series));
   }

@@ -17,6 +17,12 @@ function pointsOf(series) {
       finite(x) ? [{name: s.name, x, y: s.y[i] ?? NaN, low: s.low?.[i] ?? NaN, high: s.high?.[i] ?? NaN}] : []));
 }
 
+/** Which end of a text stands at x. */
+function anchorOf(x, points) {
+  const all = points.map((p) => p.x);
+  return 2 * x > Math.min(...all) + Math.max(...all) ? "end" : "start";
+}
+
 function linesPlot(data, width) {
   const points = pointsOf(data.series);
   const names = data.series.map((s) => s.name);
@@ -37,7 +43,9 @@ function linesPlot(data, width) {
       Plot.lineY(points, {x: "x", y: "y", stroke: "name", strokeWidth: 2}),
       Plot.dot(points.filter((p) => finite(p.y) && !Number.isNaN(p.y)), {x: "x", y: "y", fill: "name", r: 3}),
       Plot.ruleX(marks, {x: "x", stroke: "currentColor", strokeDasharray: "3 4", strokeOpacity: 0.7}),
-      Plot.text(marks, {x: "x", text: "label", frameAnchor: "top", dy: -12, fill: "currentColor"}),
+      // Towards the middle, so that neither end of the plot cuts it off.
+      ...["start", "end"].map((textAnchor) => Plot.text(marks.filter((mark) => anchorOf(mark.x, points) === textAnchor),
+        {x: "x", text: "label", frameAnchor: "top", dy: -12, textAnchor, fill: "currentColor"})),
       Plot.tip(points, Plot.pointer({
         maxRadius: 90,
         x: "x",
