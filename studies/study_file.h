@@ -51,7 +51,7 @@ struct StudyOptions {
   bool details = true;  // of each cell in the report, not its row in the tables alone; of the loop
   Keep keep = Keep::all;
   bool alone = false;  // each cell has the machine to itself: its time is what is asked for
-  std::string text;  // as it was read
+  std::string text;    // as it was read
 
   /// Null for a method of ours.
   const ExternalMethod* command_of(const std::string& method) const;
