@@ -85,6 +85,7 @@ class Workers {
 
   void run(std::vector<CellJob> waiting) {
     TimeLeft time_left(waiting);
+    for (const CellJob& job : waiting) memory_gb_[job.index] = memory_gb_of(job);
     const auto start = Clock::now();
     progress_.begin("cells", waiting.size());
     while (!waiting.empty() || !running_.empty()) {
@@ -142,7 +143,7 @@ class Workers {
   bool may_start(const CellJob& job) const {
     if (running_.empty()) return true;
     if (job.study->alone || running_.front().job->study->alone) return false;
-    double used_gb = memory_gb_of(job);
+    double used_gb = memory_gb_.at(job.index);
     for (const Running& r : running_) used_gb += r.memory_gb;
     return used_gb <= options_.memory_gb && is_free(shared_parts(job));
   }
@@ -169,7 +170,7 @@ class Workers {
                                               "--threads",
                                               std::to_string(threads)};
     running_.push_back({kept_.back().get(), std::make_unique<Process>(command, log_of(job)),
-                        shared_parts(job), memory_gb_of(job)});
+                        shared_parts(job), memory_gb_.at(job.index)});
   }
 
   void finish(const Running& r) {
@@ -200,6 +201,7 @@ class Workers {
   fs::path study_, out_;
   RunOptions options_;
   Progress& progress_;
+  std::map<int, double> memory_gb_;  // by CellJob::index: asked for at every look
   std::vector<Running> running_;
   std::vector<std::unique_ptr<CellJob>> kept_;
 };

@@ -39,7 +39,7 @@ struct FrameSource::Impl {
   cv::Mat gain;  // 1 / V; empty when switched off
   std::vector<double> profile;
   Cache<Frame> frames{kCachedFrames}, map_frames{kCachedFrames};
-  Cache<cv::Mat> raws{kCachedRaws};  // gray, as observed
+  Cache<cv::Mat> raws{kCachedRaws}, detections{kCachedRaws};  // as observed
   Cache<cv::Mat> grays, reflections;
 
   Impl(const Observations& source, const PreprocessOptions& chosen)
@@ -74,14 +74,20 @@ struct FrameSource::Impl {
   cv::Mat correct(const cv::Mat& image) const {
     return gain.empty() ? image : apply_gain(image, gain);
   }
-  cv::Mat raw(int index) {
-    return raws.get(index, [&] {
-      cv::Mat gray;
-      cv::cvtColor(observations.image(index), gray, cv::COLOR_BGR2GRAY);
-      return gray;
-    });
+  static cv::Mat gray_of(const cv::Mat& bgr) {
+    cv::Mat gray;
+    cv::cvtColor(bgr, gray, cv::COLOR_BGR2GRAY);
+    return gray;
   }
-  cv::Mat detected(int index) { return detect_reflections(raw(index), options.reflections, field); }
+  cv::Mat detected_in(const cv::Mat& raw_gray) const {
+    return detect_reflections(raw_gray, options.reflections, field);
+  }
+  cv::Mat raw(int index) {
+    return raws.get(index, [&] { return gray_of(observations.image(index)); });
+  }
+  cv::Mat detected(int index) {
+    return detections.get(index, [&] { return detected_in(raw(index)); });
+  }
   cv::Mat reflection(int index) {
     return reflections.get(index, [&] { return move_mask(detected(index)); });
   }
@@ -113,7 +119,7 @@ struct FrameSource::Impl {
   cv::Mat map_bgr(int index) {
     cv::Mat bgr = observations.image(index);
     if (options.reflections.suppress_for_map)
-      bgr = suppress_reflections(bgr, detected(index), options.reflections);
+      bgr = suppress_reflections(bgr, detected_in(gray_of(bgr)), options.reflections);
     return correct(move(bgr));
   }
 };
@@ -169,6 +175,7 @@ cv::Mat FrameSource::gray(int index) const {
 
 void FrameSource::release() const {
   impl_->raws.clear();
+  impl_->detections.clear();
   impl_->grays.clear();
   impl_->reflections.clear();
 }
