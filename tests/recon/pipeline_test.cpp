@@ -98,7 +98,9 @@ TEST_F(Pipeline, TheMapIsMadeFromAMotionOnDisk) {
   const FrameSource frames(observations, options.preprocess);
   write_motion(root_ / "motion.cbor", estimate_motion(frames, options, Stages(), progress));
   const Motion motion = read_motion(root_ / "motion.cbor");
+  const cv::Mat held = frames.gray(0);
   const Estimate in_halves = build_map(frames, motion, options, halves, Stages(), progress);
+  EXPECT_NE(frames.gray(0).data, held.data);  // forgotten before the map, which needs the memory
   for (const char* file : {"trajectory.txt", "frames.csv", "points.ply", "map.ply"})
     EXPECT_EQ(read_text(whole / file), read_text(halves / file)) << file;
   EXPECT_EQ(at_once.numbers, in_halves.numbers);
