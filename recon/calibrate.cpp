@@ -263,17 +263,47 @@ bool judge(std::vector<CalibrationImage>& images, const Fit& fit,
   return true;
 }
 
-// The size most pictures show.
-std::pair<int, int> common_size(const std::vector<cv::Mat>& grays) {
-  std::vector<std::optional<std::pair<int, int>>> sizes(grays.size());
+using BoardSize = std::pair<int, int>;
+
+// How many pictures show which size.
+std::map<BoardSize, int> count_sizes(const std::vector<cv::Mat>& grays) {
+  std::vector<std::optional<BoardSize>> sizes(grays.size());
   tbb::parallel_for(std::size_t{0}, grays.size(),
                     [&](std::size_t i) { sizes[i] = find_board_size(grays[i]); });
-  std::map<std::pair<int, int>, int> votes;
+  std::map<BoardSize, int> counts;
   for (const auto& size : sizes)
-    if (size) ++votes[*size];
-  check(!votes.empty(), "calibration: no chessboard was found in {} pictures", grays.size());
+    if (size) ++counts[*size];
+  return counts;
+}
+
+// To search for boards of any size takes ten times as long as for one of a known size, so a few
+// pictures, spread over all, say what to look for: the largest board that most of them show. (In
+// the others a part of it may have been seen.) Empty where that cannot be said.
+std::optional<BoardSize> size_from_a_few(const std::vector<cv::Mat>& grays) {
+  constexpr std::size_t kFew = 6;
+  if (grays.size() <= 2 * kFew) return std::nullopt;
+  std::vector<cv::Mat> few;
+  for (std::size_t i = 0; i < kFew; ++i) few.push_back(grays[i * grays.size() / kFew]);
+  std::vector<BoardSize> sizes;
+  for (const auto& [size, count] : count_sizes(few)) sizes.push_back(size);
+  std::sort(sizes.begin(), sizes.end(), [](const BoardSize& a, const BoardSize& b) {
+    return a.first * a.second > b.first * b.second;
+  });
+  for (const BoardSize& size : sizes) {
+    const auto shown = std::count_if(few.begin(), few.end(), [&](const cv::Mat& gray) {
+      return shows_board(gray, size.first, size.second);
+    });
+    if (2 * static_cast<std::size_t>(shown) > kFew) return size;
+  }
+  return std::nullopt;
+}
+
+BoardSize board_size(const std::vector<cv::Mat>& grays) {
+  if (const std::optional<BoardSize> size = size_from_a_few(grays)) return *size;
+  const std::map<BoardSize, int> counts = count_sizes(grays);
+  check(!counts.empty(), "calibration: no chessboard was found in {} pictures", grays.size());
   // Parts of the board have fewer corners: of equal votes the larger size holds.
-  return std::max_element(votes.begin(), votes.end(),
+  return std::max_element(counts.begin(), counts.end(),
                           [](const auto& a, const auto& b) { return a.second <= b.second; })
       ->first;
 }
@@ -355,8 +385,8 @@ CalibrationResult calibrate(const std::vector<fs::path>& pictures,
           grays.back().cols, grays.back().rows, pictures.front().string(), grays.front().cols,
           grays.front().rows);
   }
-  std::pair<int, int> size(options.columns, options.rows);
-  if (options.columns == 0) size = common_size(grays);
+  BoardSize size(options.columns, options.rows);
+  if (options.columns == 0) size = board_size(grays);
   std::vector<CalibrationImage> images(pictures.size());
   tbb::parallel_for(std::size_t{0}, pictures.size(), [&](std::size_t i) {
     images[i].file = pictures[i];

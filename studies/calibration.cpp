@@ -23,7 +23,7 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 // Raised when the same settings give other results, so that older ones are not taken for new.
-constexpr int kResultsVersion = 1;
+constexpr int kResultsVersion = 2;
 constexpr std::size_t kHashLetters = 10;
 
 // A person holds the board still until the exposure has settled.

@@ -10,12 +10,15 @@
 #include <map>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <sstream>
 
 #include "core/check.h"
 #include "core/random.h"
+#include "dataset/image_io.h"
 #include "recon/chessboard.h"
 #include "synthetic_texture.h"
+#include "tests/dataset/plane_dataset.h"
 #include "tests/shared_data.h"
 
 namespace rugae {
@@ -75,10 +78,11 @@ std::vector<CalibrationImage> exact_views(const Lens& lens, int count) {
 // The board as the lens sees it, white margin included; 3 x 3 rays a pixel.
 cv::Mat picture(const Lens& lens, const Rigid3& cam_from_board, bool mirrored) {
   const Rigid3 board_from_cam = cam_from_board.inverse();
+  const LensProjector projector(lens);
   const auto shade = [&](const Vec2& pixel) {
     double sum = 0.0;
     for (int s = 0; s < 9; ++s) {
-      const auto ray = lens.unproject(pixel + Vec2(s % 3 - 1, s / 3 - 1) / 3.0);
+      const auto ray = projector.unproject(pixel + Vec2(s % 3 - 1, s / 3 - 1) / 3.0);
       const Vec3 o = board_from_cam.translation, d = board_from_cam.rotation * *ray;
       const Vec3 hit = (o - d * (o.z() / d.z())) / kSquareMm;
       const bool inside = hit.x() > -1 && hit.y() > -1 && hit.x() < kColumns && hit.y() < kRows;
@@ -168,6 +172,39 @@ TEST(Calibrate, FindsDrawnBoardsMirroredOrNot) {
       EXPECT_EQ(find_board_size(gray), std::make_pair(kColumns, kRows));
     }
   }
+}
+
+// A hand covers part of the board in one of the pictures that are asked for its size.
+TEST(Calibrate, TheSizeIsThatOfTheWholeBoard) {
+  const testing::TemporaryFolder folder("board_size");
+  Lens lens = endoscope(LensModel::brown_conrady);
+  lens.width /= 2;  // drawn in a quarter of the time
+  lens.height /= 2;
+  for (double* length : {&lens.fx, &lens.fy, &lens.cx, &lens.cy}) *length *= 0.5;
+  const std::vector<Rigid3> poses = board_poses(13);
+  std::vector<fs::path> pictures;
+  constexpr std::size_t kCovered = 4;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    cv::Mat gray = picture(lens, poses[i], false);
+    if (i == kCovered) {
+      const BoardView board = exact_view(lens, poses[i]).board;
+      std::vector<cv::Point> hand;
+      for (const int corner : {4, kColumns - 1, kColumns * kRows - 1, kColumns * (kRows - 1) + 4}) {
+        const Vec2& at = board.corners_px[static_cast<std::size_t>(corner)];
+        hand.emplace_back(static_cast<int>(at.x()), static_cast<int>(at.y()));
+      }
+      cv::fillConvexPoly(gray, hand, cv::Scalar(200));
+    }
+    pictures.push_back(folder.path() / fmt::format("{:06d}.png", i));
+    write_image(pictures.back(), gray);
+  }
+  CalibrationOptions options;
+  options.square_mm = kSquareMm;
+  const CalibrationResult result = calibrate(pictures, options);
+  EXPECT_EQ(result.columns, kColumns);
+  EXPECT_EQ(result.rows, kRows);
+  EXPECT_EQ(result.used, static_cast<int>(poses.size()) - 1);
+  expect_lens(result.lens, lens, 0.5, 0.01);
 }
 
 TEST(Calibrate, SaysWhatIsWrong) {
