@@ -78,7 +78,10 @@ BundleReport bundle_adjust(Structure& structure, double focal_px, const BundleOp
   std::vector<int> camera_of(n, -1), keyframe_of;  // of the problem; of the structure
   std::vector<Track*> adjusted;
   BundleReport report;
-  for (Track& track : structure.tracks) {
+  const bool known = !scope.tracks.empty();
+  const std::size_t candidates = known ? scope.tracks.size() : structure.tracks.size();
+  for (std::size_t i = 0; i < candidates; ++i) {
+    Track& track = structure.tracks[known ? scope.tracks[i] : i];
     if (!track.triangulated) continue;
     const auto counts = [&](const Track::Observation& o) {
       return o.inlier && structure.placed[o.keyframe];

@@ -58,10 +58,24 @@ struct Shared {
   std::vector<std::size_t> tracks;
 };
 
-// Tracks that both key frames see.
-Shared shared_tracks(const Structure& s, int first, int second) {
-  Shared shared;
+// Of each key frame the tracks it sees, so that nobody looks through all of them for those of one.
+using SeenTracks = std::vector<std::vector<std::size_t>>;
+
+SeenTracks seen_tracks(const Structure& s) {
+  SeenTracks seen(s.frames.size());
   for (std::size_t t = 0; t < s.tracks.size(); ++t) {
+    for (const auto& o : s.tracks[t].observations) {
+      std::vector<std::size_t>& of = seen[static_cast<std::size_t>(o.keyframe)];
+      if (of.empty() || of.back() != t) of.push_back(t);
+    }
+  }
+  return seen;
+}
+
+// Tracks that both key frames see.
+Shared shared_tracks(const Structure& s, const SeenTracks& seen, int first, int second) {
+  Shared shared;
+  for (const std::size_t t : seen[static_cast<std::size_t>(first)]) {
     const Track::Observation *a = nullptr, *b = nullptr;
     for (const auto& o : s.tracks[t].observations) {
       if (o.keyframe == first) a = &o;
@@ -96,6 +110,7 @@ double median_motion_px(const Shared& shared, double focal_px) {
 // only the first of them are looked at closely.
 std::optional<Start> best_start(const Structure& s, const std::vector<char>& available,
                                 double focal_px, const BundleOptions& options) {
+  const SeenTracks seen = seen_tracks(s);
   std::vector<int> keys;
   for (int k = 0; k < static_cast<int>(available.size()); ++k)
     if (available[k]) keys.push_back(k);
@@ -109,7 +124,7 @@ std::optional<Start> best_start(const Structure& s, const std::vector<char>& ava
   const int stride = std::max(1, (n - 1) / kStartsLookedAt);
   for (int i = 0; i + 1 < n; i += stride) {
     for (int j = i + 1; j < n && keys[j] <= keys[i] + kStartWindow; ++j) {
-      const Shared shared = shared_tracks(s, keys[i], keys[j]);
+      const Shared shared = shared_tracks(s, seen, keys[i], keys[j]);
       if (static_cast<int>(shared.tracks.size()) < kMinStartInliers) break;
       const double motion = std::min(1.0, median_motion_px(shared, focal_px) / kGoodMotionPx);
       ranked.push_back({motion * static_cast<double>(shared.tracks.size()), keys[i], keys[j]});
@@ -122,7 +137,7 @@ std::optional<Start> best_start(const Structure& s, const std::vector<char>& ava
   int tried = 0;
   for (const Ranked& pair : ranked) {
     if (++tried > (best ? kStartsTried : kStartsTriedInVain)) break;
-    Shared shared = shared_tracks(s, pair.first, pair.second);
+    Shared shared = shared_tracks(s, seen, pair.first, pair.second);
     auto view = two_view(shared.first, shared.second, focal_px, kTwoViewHubers * options.huber_px);
     if (!view || view->inliers < kMinStartInliers) continue;
     if (!(view->median_parallax_rad >= options.min_parallax_rad)) continue;
@@ -137,9 +152,10 @@ std::optional<Start> best_start(const Structure& s, const std::vector<char>& ava
 }
 
 // Known points that a key frame sees.
-void known_points(const Structure& s, int keyframe, std::vector<Vec3>& points,
-                  std::vector<Vec2>& rays) {
-  for (const Track& track : s.tracks) {
+void known_points(const Structure& s, const SeenTracks& seen, int keyframe,
+                  std::vector<Vec3>& points, std::vector<Vec2>& rays) {
+  for (const std::size_t t : seen[static_cast<std::size_t>(keyframe)]) {
+    const Track& track = s.tracks[t];
     if (!track.triangulated) continue;
     for (const auto& o : track.observations) {
       if (o.keyframe != keyframe) continue;
@@ -150,9 +166,10 @@ void known_points(const Structure& s, int keyframe, std::vector<Vec3>& points,
 }
 
 // The placed key frames that share most points with `keyframe`, and itself.
-std::vector<int> neighbourhood(const Structure& s, int keyframe) {
+std::vector<int> neighbourhood(const Structure& s, const SeenTracks& seen, int keyframe) {
   std::vector<int> shared(s.frames.size(), 0);
-  for (const Track& track : s.tracks) {
+  for (const std::size_t t : seen[static_cast<std::size_t>(keyframe)]) {
+    const Track& track = s.tracks[t];
     if (!track.triangulated) continue;
     const bool sees =
         std::any_of(track.observations.begin(), track.observations.end(),
@@ -168,9 +185,10 @@ std::vector<int> neighbourhood(const Structure& s, int keyframe) {
   return order;
 }
 
-void triangulate_seen(Structure& s, int keyframe, double focal_px, double max_px,
-                      const BundleOptions& options) {
-  for (Track& track : s.tracks) {
+void triangulate_seen(Structure& s, const SeenTracks& seen, int keyframe, double focal_px,
+                      double max_px, const BundleOptions& options) {
+  for (const std::size_t t : seen[static_cast<std::size_t>(keyframe)]) {
+    Track& track = s.tracks[t];
     for (auto& o : track.observations) {
       if (o.keyframe != keyframe) continue;
       if (!track.triangulated)
@@ -198,14 +216,26 @@ void begin_with(Structure& s, const Start& start, const BundleOptions& options) 
 }
 
 // Points seen by each key frame that is available and not placed.
-std::vector<int> known_counts(const Structure& s, const std::vector<char>& available) {
+std::vector<int> known_counts(const Structure& s, const SeenTracks& seen,
+                              const std::vector<char>& available) {
   std::vector<int> counts(s.frames.size(), 0);
-  for (const Track& track : s.tracks) {
-    if (!track.triangulated) continue;
-    for (const auto& o : track.observations)
-      counts[o.keyframe] += available[o.keyframe] && !s.placed[o.keyframe];
-  }
+  for (std::size_t k = 0; k < counts.size(); ++k)
+    if (available[k] && !s.placed[k])
+      counts[k] = static_cast<int>(
+          std::ranges::count_if(seen[k], [&](std::size_t t) { return s.tracks[t].triangulated; }));
   return counts;
+}
+
+// What any of the key frames sees, in order.
+std::vector<std::size_t> seen_by_any(const SeenTracks& seen, const std::vector<int>& keyframes) {
+  std::vector<std::size_t> tracks;
+  for (const int k : keyframes) {
+    const std::vector<std::size_t>& of = seen[static_cast<std::size_t>(k)];
+    tracks.insert(tracks.end(), of.begin(), of.end());
+  }
+  std::ranges::sort(tracks);
+  tracks.erase(std::unique(tracks.begin(), tracks.end()), tracks.end());
+  return tracks;
 }
 
 }  // namespace
@@ -265,9 +295,10 @@ void SegmentGrowth::adjust_globally() {
 void SegmentGrowth::extend(const std::vector<char>& available, Progress& progress) {
   Structure& s = structure_;
   const double max_px = kOutlierHubers * options_.huber_px;
+  const SeenTracks seen = seen_tracks(s);
   tried_.resize(s.frames.size(), 0);
   for (;;) {
-    const std::vector<int> counts = known_counts(s, available);
+    const std::vector<int> counts = known_counts(s, seen, available);
     int next = -1;
     for (int k = 0; k < static_cast<int>(counts.size()); ++k) {
       if (counts[k] < options_.min_resection_inliers || counts[k] <= tried_[k]) continue;
@@ -276,7 +307,7 @@ void SegmentGrowth::extend(const std::vector<char>& available, Progress& progres
     if (next < 0) break;
     std::vector<Vec3> points;
     std::vector<Vec2> rays;
-    known_points(s, next, points, rays);
+    known_points(s, seen, next, points, rays);
     const auto placement = place_by_points(points, rays, focal_px_, options_);
     if (!placement) {
       tried_[next] = counts[next];
@@ -286,12 +317,13 @@ void SegmentGrowth::extend(const std::vector<char>& available, Progress& progres
     s.cam_from_world[next] = placement->cam_from_world;
     ++placed_;
     progress.step();
-    triangulate_seen(s, next, focal_px_, max_px, options_);
+    triangulate_seen(s, seen, next, focal_px_, max_px, options_);
     if (placed_ >= kGlobalGrowth * placed_at_global_) {
       adjust_globally();
     } else {
       BundleScope local;
-      local.free_keyframes = neighbourhood(s, next);
+      local.free_keyframes = neighbourhood(s, seen, next);
+      local.tracks = seen_by_any(seen, local.free_keyframes);
       local.max_iterations = kLocalIterations;
       local.function_tolerance = 1e-3;
       bundle_adjust(s, focal_px_, options_, local);
