@@ -1,12 +1,10 @@
 #include "recon/keyframes.h"
 
-#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <future>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -17,8 +15,7 @@ namespace {
 
 constexpr double kReferenceWidthPx = 640.0;  // of the threshold
 constexpr int kWorkWidthPx = 320;            // the mean magnitude needs no finer flow than this
-constexpr int kReadAhead = 8;                // frames prepared while others are compared
-constexpr std::size_t kAtOnce = 2;           // candidates compared at the same time
+constexpr int kPreparedAtOnce = 8;           // frames
 
 // Over the valid pixels.
 double mean_magnitude(const cv::Mat& flow, const cv::Mat& valid) {
@@ -39,11 +36,11 @@ struct Candidate {
   FlowImage image;  // shrunk
 };
 
-// Frames begin .. begin + kReadAhead - 1, those before `end`, shrunk, prepared in parallel; `valid`
-// is as small.
+// Frames begin .. begin + kPreparedAtOnce - 1, those before `end`, shrunk, prepared in parallel;
+// `valid` is as small.
 std::vector<Candidate> prepare(const FrameSource& frames, int begin, int end, int shrink,
                                const cv::Mat& valid) {
-  const int count = std::max(0, std::min(kReadAhead, end - begin));
+  const int count = std::max(0, std::min(kPreparedAtOnce, end - begin));
   std::vector<Candidate> block(static_cast<std::size_t>(count));
   tbb::parallel_for(0, count, [&](int i) {
     cv::Mat gray = frames.gray(begin + i);
@@ -71,24 +68,18 @@ class Selection {
         px_per_flow_(px_per_flow),
         valid_(std::move(valid)) {}
 
-  void offer(const Candidate& frame) { queue_.push_back(frame); }
-
-  /// Compares what is waiting; without `all`, only while there is enough to do it side by side.
-  void run(bool all) {
-    while (!queue_.empty() && (all || queue_.size() >= kAtOnce)) {
+  /// One after the other: two compared at once would often be one too many, for once a candidate
+  /// becomes the reference the values of those after it are void.
+  void offer(const Candidate& frame) {
+    queue_.push_back(frame);
+    while (!queue_.empty()) {
       if (keys_.frames.empty()) {
         accept(next(), 0.0);
         continue;
       }
-      // Speculation: once a candidate becomes the reference, the values of those after it are void.
-      std::vector<double> values(std::min(queue_.size(), kAtOnce));
-      tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t i) {
-        values[i] = px_per_flow_ *
-                    mean_magnitude(farneback_flow(reference_.image, queue_[i].image), valid_);
-      });
-      for (const double value : values) {
-        if (decide(next(), value)) break;
-      }
+      const double flow =
+          mean_magnitude(farneback_flow(reference_.image, queue_.front().image), valid_);
+      decide(next(), px_per_flow_ * flow);
     }
   }
 
@@ -101,21 +92,16 @@ class Selection {
     return front;
   }
 
-  // True when there is a new reference.
-  bool decide(const Candidate& candidate, double value) {
-    if (value >= threshold_px_) {
-      accept(candidate, value);
-      return true;
-    }
+  void decide(const Candidate& candidate, double value) {
+    if (value >= threshold_px_) return accept(candidate, value);
     failed_.push_back(candidate);
     values_.push_back(value);
-    if (static_cast<int>(failed_.size()) < max_gap_) return false;
+    if (static_cast<int>(failed_.size()) < max_gap_) return;
     // The frame with the largest value; those after it are compared again, with it.
     const auto best = std::max_element(values_.begin(), values_.end()) - values_.begin();
     const Candidate chosen = failed_[static_cast<std::size_t>(best)];
     queue_.insert(queue_.begin(), failed_.begin() + best + 1, failed_.end());
     accept(chosen, values_[static_cast<std::size_t>(best)]);
-    return true;
   }
 
   void accept(const Candidate& frame, double value) {
@@ -160,32 +146,16 @@ KeyframeSelector::KeyframeSelector(const FrameSource& frames, const KeyframeOpti
 }
 KeyframeSelector::~KeyframeSelector() = default;
 
-void KeyframeSelector::advance(int end, const std::function<void()>& looked) {
+void KeyframeSelector::advance(int end) {
   Impl& s = *impl_;
-  std::vector<Candidate> block = prepare(s.frames, s.next, end, s.shrink, s.valid);
-  while (!block.empty()) {
-    s.next = block.back().index + 1;
-    std::future<std::vector<Candidate>> ahead = std::async(
-        std::launch::async, [&] { return prepare(s.frames, s.next, end, s.shrink, s.valid); });
-    for (const Candidate& frame : block) {
+  while (s.next < end) {
+    for (const Candidate& frame : prepare(s.frames, s.next, end, s.shrink, s.valid)) {
+      s.next = frame.index + 1;
       s.selection.offer(frame);
-      s.selection.run(false);
-      if (looked) looked();
     }
-    block = ahead.get();
   }
-  s.selection.run(true);
 }
 
 const Keyframes& KeyframeSelector::keyframes() const { return impl_->selection.keyframes(); }
-
-Keyframes select_keyframes(const FrameSource& frames, const KeyframeOptions& options,
-                           Progress& progress) {
-  KeyframeSelector selector(frames, options);
-  progress.begin("key frames", static_cast<std::size_t>(frames.size()));
-  selector.advance(frames.size(), [&] { progress.step(); });
-  progress.end(fmt::format("{} of {} frames", selector.keyframes().frames.size(), frames.size()));
-  return selector.keyframes();
-}
 
 }  // namespace rugae

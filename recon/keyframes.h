@@ -2,11 +2,9 @@
 // Key frames, the paper's algorithm 2: mean magnitude of the Farneback flow since the last key
 // frame.
 
-#include <functional>
 #include <memory>
 #include <vector>
 
-#include "core/progress.h"
 #include "recon/flow.h"
 #include "recon/options.h"
 #include "recon/preprocess/preprocess.h"
@@ -24,18 +22,14 @@ class KeyframeSelector {
   KeyframeSelector(const FrameSource& frames, const KeyframeOptions& options);
   ~KeyframeSelector();
 
-  /// Looks at the frames up to before `end` that it has not looked at; `looked` is called for each.
-  /// Those chosen do not depend on how many come at a time.
-  void advance(int end, const std::function<void()>& looked = {});
+  /// Looks at the frames up to before `end` that it has not looked at. Those chosen do not depend
+  /// on how many come at a time.
+  void advance(int end);
   const Keyframes& keyframes() const;
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// All of a sequence.
-Keyframes select_keyframes(const FrameSource& frames, const KeyframeOptions& options,
-                           Progress& progress);
 
 }  // namespace rugae

@@ -43,12 +43,21 @@ Motion solve_motion(const FrameSource& frames, Followed followed, const ReconOpt
 
 Motion estimate_motion(const FrameSource& frames, const ReconOptions& options, const Stages& stages,
                        Progress& progress) {
-  const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());    // of the caller
-  const Keyframes keys = select_keyframes(frames, options.keyframes, progress);  // algorithm 2
-  // Algorithm 3: steps 2 to 6, pairs; step 7, all poses jointly.
-  Followed followed = stages.follow(frames, keys, options, progress);
+  const std::size_t earlier = progress.stages().size();  // of the caller
+  // Algorithm 2, key frames, and of algorithm 3 steps 2 to 6, pairs.
+  Followed followed = stages.follow(frames, options, progress);
+  const std::vector<StageTime> following = followed.stages;
+  const std::size_t before = progress.stages().size();
+  // Algorithm 3, step 7, all poses jointly.
   Motion motion = solve_motion(frames, std::move(followed), options, stages, progress);
-  motion.stages.assign(progress.stages().begin() + earlier, progress.stages().end());
+  // The one stage that following was on the terminal is known in its parts.
+  const auto at = [&](std::size_t i) {
+    return progress.stages().begin() + static_cast<std::ptrdiff_t>(i);
+  };
+  motion.stages.assign(at(earlier), at(before));
+  motion.stages.pop_back();
+  motion.stages.insert(motion.stages.end(), following.begin(), following.end());
+  motion.stages.insert(motion.stages.end(), at(before), progress.stages().end());
   return motion;
 }
 

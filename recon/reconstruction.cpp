@@ -2,30 +2,12 @@
 
 #include "core/check.h"
 #include "core/files.h"
+#include "core/seconds_of.h"
 #include "recon/pictures.h"
 #include "recon/pipeline.h"
 
 namespace rugae {
 namespace {
-
-constexpr int kBlock = 8;  // frames that are looked at together where nobody asks for the latest
-
-// Adds to a stage how long it lives.
-class Timer {
- public:
-  explicit Timer(StageTime& stage) : stage_(stage) {}
-  ~Timer() {
-    stage_.seconds += std::chrono::duration<double>(Clock::now() - start_).count();
-    stage_.peak_rss_mb = peak_rss_mb();
-  }
-  Timer(const Timer&) = delete;
-  Timer& operator=(const Timer&) = delete;
-
- private:
-  using Clock = std::chrono::steady_clock;
-  StageTime& stage_;
-  Clock::time_point start_ = Clock::now();
-};
 
 // A listener hears of progress as long as this lives.
 class Watched {
@@ -49,10 +31,9 @@ class Watched {
 Reconstruction::Reconstruction(const Observations& recorded, const ReconOptions& options)
     : options_(options), recorded_(true) {
   options.check();
-  {
-    const Timer timer(preprocessing_);
-    frames_ = std::make_unique<FrameSource>(recorded, options.preprocess);
-  }
+  preprocessing_.seconds =
+      seconds_of([&] { frames_ = std::make_unique<FrameSource>(recorded, options.preprocess); });
+  preprocessing_.peak_rss_mb = peak_rss_mb();
   begin();
 }
 
@@ -69,13 +50,11 @@ Reconstruction::Reconstruction(const std::filesystem::path& folder, const Calibr
 Reconstruction::~Reconstruction() = default;
 
 void Reconstruction::begin() {
-  selector_ = std::make_unique<KeyframeSelector>(*frames_, options_.keyframes);
-  follower_ = std::make_unique<TrackFollower>(*frames_, follow_options(options_), options_.tracks,
-                                              options_.seed, recorded_);
+  follower_ = std::make_unique<FrameFollower>(*frames_, options_, recorded_);
 }
 
 void Reconstruction::check_open() const {
-  check(selector_ != nullptr, "the reconstruction was finished");
+  check(follower_ != nullptr, "the reconstruction was finished");
 }
 
 void Reconstruction::add() {
@@ -83,7 +62,9 @@ void Reconstruction::add() {
   check(recorded_ && added_ < frames_->size(), "frame {} of {}: no such frame", added_,
         frames_->size());
   ++added_;
-  if (added_ - looked_at_ >= kBlock) follow_what_came();
+  if (added_ - follower_->looked_at() < kFramesAtOnce) return;
+  follower_->look_at(added_);
+  show_what_was_followed();
 }
 
 void Reconstruction::add(const cv::Mat& bgr, double time_s) {
@@ -91,32 +72,25 @@ void Reconstruction::add(const cv::Mat& bgr, double time_s) {
   check(!recorded_, "a frame was added to a recorded sequence");
   frames_->append(bgr, time_s);
   ++added_;
-  follow_what_came();
+  catch_up();
 }
 
-void Reconstruction::follow_what_came() {
-  {
-    const Timer timer(selecting_);
-    selector_->advance(added_);
-    looked_at_ = added_;
-  }
-  {
-    const Timer timer(following_);
-    const std::vector<int>& chosen = selector_->keyframes().frames;
-    for (; followed_ < chosen.size(); ++followed_) follower_->add(chosen[followed_]);
-  }
+void Reconstruction::catch_up() {
+  if (follower_->looked_at() < added_) follower_->look_at(added_);
+  follower_->catch_up();
   show_what_was_followed();
 }
 
 // The last key frame is not shown yet: nothing was followed from it, and more may lead into it.
 void Reconstruction::show_what_was_followed() {
   if (listener_ == nullptr) return;
-  const std::vector<int> settled = follower_->settled();
+  const TrackChain& chain = follower_->tracks().chain();
+  const std::vector<int> settled = follower_->tracks().settled();
   for (; shown_ + 1 < settled.size(); ++shown_) {
     const int frame = settled[shown_];
     std::vector<FollowedPoint> points;
-    for (const int t : follower_->chain().through(frame)) {
-      const Track& track = follower_->chain().tracks()[static_cast<std::size_t>(t)];
+    for (const int t : chain.through(frame)) {
+      const Track& track = chain.tracks()[static_cast<std::size_t>(t)];
       for (const auto& o : track.observations)
         if (o.keyframe == frame) points.push_back({o.pixel, track.observations.size()});
     }
@@ -128,9 +102,9 @@ void Reconstruction::show_what_was_followed() {
 
 LivePath& Reconstruction::live() {
   check_open();
-  if (looked_at_ < added_) follow_what_came();
+  catch_up();
   if (!live_) live_ = std::make_unique<LivePath>(*frames_, options_);
-  live_->update(*follower_);
+  live_->update(follower_->tracks());
   return *live_;
 }
 
@@ -148,19 +122,16 @@ TriangleMesh Reconstruction::map() {
   if (structure.placed_count() == 0) return {};
   remove_outliers(structure);
   Progress quiet(Progress::Output::silent);
-  return make_map(*frames_, structure, follower_->pairs(), options_, Stages(), quiet).mesh;
+  return make_map(*frames_, structure, follower_->tracks().pairs(), options_, Stages(), quiet).mesh;
 }
 
 Estimate Reconstruction::finish(const std::filesystem::path& out, Progress& progress) {
   check_open();
   progress.end();  // the caller's loop over frames: its parts have times of their own
-  if (looked_at_ < added_) follow_what_came();
-  Followed followed = [&] {
-    const Timer timer(following_);
-    return follower_->finish();
-  }();
+  catch_up();
+  Followed followed = follower_->finish();
+  const std::vector<StageTime> following = followed.stages;
   live_.reset();
-  selector_.reset();
   follower_.reset();
   const Watched watched(progress, listener_);
   const Stages stages;
@@ -170,7 +141,8 @@ Estimate Reconstruction::finish(const std::filesystem::path& out, Progress& prog
     frames_ = std::make_unique<FrameSource>(frames_->observations(), options_.preprocess);
   }
   Motion motion = solve_motion(*frames_, std::move(followed), options_, stages, progress);
-  motion.stages = {preprocessing_, selecting_, following_};
+  motion.stages = {preprocessing_};
+  motion.stages.insert(motion.stages.end(), following.begin(), following.end());
   motion.stages.insert(motion.stages.end(), progress.stages().begin() + earlier,
                        progress.stages().end());
   return build_map(*frames_, motion, options_, out, stages, progress, listener_);

@@ -1,7 +1,6 @@
 #pragma once
 // The reconstruction as an object that takes frames one at a time.
 
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <opencv2/core/mat.hpp>
@@ -10,12 +9,11 @@
 #include "core/progress.h"
 #include "dataset/estimate.h"
 #include "dataset/observations.h"
-#include "recon/keyframes.h"
+#include "recon/frame_follower.h"
 #include "recon/listener.h"
 #include "recon/live_path.h"
 #include "recon/options.h"
 #include "recon/preprocess/preprocess.h"
-#include "recon/tracks.h"
 
 namespace rugae {
 
@@ -56,24 +54,21 @@ class Reconstruction {
   Estimate finish(const std::filesystem::path& out, Progress& progress);
 
  private:
-  using Clock = std::chrono::steady_clock;
   void begin();
   void check_open() const;
-  void follow_what_came();
+  void catch_up();
   void show_what_was_followed();
   LivePath& live();
 
   ReconOptions options_;
   bool recorded_;
   std::unique_ptr<FrameSource> frames_;
-  std::unique_ptr<KeyframeSelector> selector_;
-  std::unique_ptr<TrackFollower> follower_;
+  std::unique_ptr<FrameFollower> follower_;
   std::unique_ptr<LivePath> live_;  // from the first question on
   Listener* listener_ = nullptr;
-  std::size_t followed_ = 0, shown_ = 0;  // key frames handed to the follower, to the listener
-  int added_ = 0, looked_at_ = 0;         // frames
-  StageTime preprocessing_{"preprocessing"}, selecting_{"key frames"},
-      following_{"pairwise alignment"};
+  std::size_t shown_ = 0;  // key frames handed to the listener
+  int added_ = 0;          // frames
+  StageTime preprocessing_{"preprocessing"};
 };
 
 }  // namespace rugae

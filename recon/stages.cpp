@@ -5,22 +5,13 @@
 #include "recon/dense/frame_poses.h"
 #include "recon/dense/linked_structure.h"
 #include "recon/dense/metric_scale.h"
+#include "recon/frame_follower.h"
 #include "recon/resection.h"
 
 namespace rugae {
 
-AlignOptions follow_options(const ReconOptions& options) {
-  AlignOptions align = options.align;
-  if (options.method == "dense") align.neighbours = options.revisits.neighbours;
-  return align;
-}
-
 Stages::Stages()
-    : follow([](const FrameSource& frames, const Keyframes& keyframes, const ReconOptions& options,
-                Progress& progress) {
-        return follow_tracks(frames, keyframes, follow_options(options), options.tracks,
-                             options.seed, progress);
-      }),
+    : follow(follow_frames),
       structure([](const FrameSource& frames, const std::vector<int>& keyframes,
                    std::vector<Track> tracks, const ReconOptions& options, Progress& progress) {
         if (options.method != "dense")

@@ -9,20 +9,15 @@
 
 #include "core/progress.h"
 #include "core/rigid3.h"
-#include "recon/keyframes.h"
 #include "recon/map.h"
 #include "recon/options.h"
 #include "recon/tracks.h"
 
 namespace rugae {
 
-/// How key frames are aligned, by the method.
-AlignOptions follow_options(const ReconOptions& options);
-
 struct Stages {
-  /// Pairs and tracks of the key frames: follow_tracks().
-  std::function<Followed(const FrameSource&, const Keyframes&, const ReconOptions&, Progress&)>
-      follow;
+  /// Key frames, their pairs and tracks: follow_frames().
+  std::function<Followed(const FrameSource&, const ReconOptions&, Progress&)> follow;
   /// Poses of the key frames, and points: build_structure().
   std::function<Structure(const FrameSource&, const std::vector<int>& keyframes, std::vector<Track>,
                           const ReconOptions&, Progress&)>

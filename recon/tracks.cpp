@@ -258,7 +258,7 @@ void TrackFollower::add(int frame) {
 Followed TrackFollower::finish() {
   Impl& s = *impl_;
   while (s.k < s.at.size()) s.step();
-  Followed followed{s.at, std::move(s.pairs), s.chain.finish()};
+  Followed followed{s.at, std::move(s.pairs), s.chain.finish(), {}};
   number_keyframes(followed.tracks, followed.keyframes);
   set_rays(followed.tracks, s.frames.lens());
   return followed;
@@ -277,21 +277,6 @@ std::string TrackFollower::remark() const {
   const Impl& s = *impl_;
   return fmt::format("{} failed, {} key frames more{}", s.failed, s.between,
                      s.bridges > 0 ? fmt::format(", {} gaps bridged", s.bridges) : "");
-}
-
-Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
-                       const AlignOptions& align_options, const TrackOptions& options,
-                       std::uint64_t seed, Progress& progress) {
-  progress.begin("pairwise alignment", keyframes.frames.size());
-  TrackFollower follower(frames, align_options, options, seed);
-  for (const int frame : keyframes.frames) {
-    follower.add(frame);
-    progress.step();
-  }
-  Followed followed = follower.finish();
-  progress.end(fmt::format("{} pairs, {} tracks, {}", followed.pairs.size(), followed.tracks.size(),
-                           follower.remark()));
-  return followed;
 }
 
 }  // namespace rugae

@@ -9,7 +9,7 @@
 
 #include "core/progress.h"
 #include "recon/align.h"
-#include "recon/keyframes.h"
+#include "recon/preprocess/preprocess.h"
 #include "recon/structure.h"
 #include "recon/track_chain.h"
 
@@ -26,6 +26,7 @@ struct Followed {
   std::vector<int> keyframes;  // frame indices: as selected, and those that had to come between
   std::vector<PairAlignment> pairs;  // of neighbouring key frames
   std::vector<Track> tracks;         // with rays
+  std::vector<StageTime> stages;     // what it took
 };
 
 /// Key frames one after another. Each is aligned to the `neighbours` after it, and the inliers are
@@ -59,10 +60,5 @@ class TrackFollower {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// All key frames of a sequence.
-Followed follow_tracks(const FrameSource& frames, const Keyframes& keyframes,
-                       const AlignOptions& align_options, const TrackOptions& options,
-                       std::uint64_t seed, Progress& progress);
 
 }  // namespace rugae

@@ -225,9 +225,9 @@ Stages stages_with(Replace replace, const std::filesystem::path& dataset, const 
   const auto oracle = std::make_shared<const Oracle>(dataset, lens);
   const Stages ours;
   if (replace == Replace::correspondences) {
-    stages.follow = [=](const FrameSource& frames, const Keyframes& keyframes,
-                        const ReconOptions& options, Progress& progress) {
-      return oracle->true_tracks(frames, ours.follow(frames, keyframes, options, progress));
+    stages.follow = [=](const FrameSource& frames, const ReconOptions& options,
+                        Progress& progress) {
+      return oracle->true_tracks(frames, ours.follow(frames, options, progress));
     };
     stages.resect = [=](const FrameSource& frames, const Structure& structure,
                         const ReconOptions& options, Progress& progress) {

@@ -143,10 +143,11 @@ TEST(FieldStop, KeyFramesAreThoseOfTheWallThatIsSeen) {
   PreprocessOptions preprocess;
   preprocess.devignette = false;
   const FrameSource frames(Observations::open(folder, folder / "lens.yaml"), preprocess);
-  Progress progress(Progress::Output::silent);
   KeyframeOptions options;
   options.mean_flow_px = 26.0;  // 13 at this width: two steps
-  const Keyframes keys = select_keyframes(frames, options, progress);
+  KeyframeSelector selector(frames, options);
+  selector.advance(frames.size());
+  const Keyframes keys = selector.keyframes();
   EXPECT_EQ(keys.frames, (std::vector<int>{0, 2, 4, 6}));
   for (std::size_t k = 1; k < keys.frames.size(); ++k)
     EXPECT_NEAR(keys.mean_flow_px[k], 2.0 * kStepPx, 0.8);

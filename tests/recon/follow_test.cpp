@@ -16,8 +16,9 @@ using FollowTracks = testing::ImageSequence;
 constexpr double kTrackPx = 0.25;
 
 Followed follow(const FrameSource& frames, const std::vector<int>& keyframes) {
-  Progress progress(Progress::Output::silent);
-  return follow_tracks(frames, {keyframes, {}}, {}, {}, 1, progress);
+  TrackFollower follower(frames, {}, {}, 1);
+  for (const int frame : keyframes) follower.add(frame);
+  return follower.finish();
 }
 
 std::ptrdiff_t shared(const std::vector<Track>& tracks, int first, int second) {

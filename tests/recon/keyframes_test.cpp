@@ -20,11 +20,16 @@ using testing::to_8bit;
 
 using Sequence = testing::ImageSequence;
 
+Keyframes select_keyframes(const FrameSource& frames, const KeyframeOptions& options) {
+  KeyframeSelector selector(frames, options);
+  selector.advance(frames.size());
+  return selector.keyframes();
+}
+
 TEST_F(Sequence, AKeyFrameIsTakenWhereTheMeanFlowReachesTheThreshold) {
   // 30 px at 640 px width are 15 px here: four steps of 4 px.
   const FrameSource frames = source(std::vector<double>(12, 4.0), plain());
-  Progress progress(Progress::Output::silent);
-  const Keyframes keys = select_keyframes(frames, {}, progress);
+  const Keyframes keys = select_keyframes(frames, {});
   EXPECT_EQ(keys.frames, (std::vector<int>{0, 4, 8, 12}));
   ASSERT_EQ(keys.mean_flow_px.size(), 4u);
   EXPECT_EQ(keys.mean_flow_px[0], 0.0);
@@ -38,8 +43,7 @@ TEST_F(Sequence, AfterTheGapTheFrameFurthestAwayIsTaken) {
   const FrameSource frames = source({5, 5, -3, -3, -2, 0, 0, 0, 0, 0}, plain());
   KeyframeOptions options;
   options.max_gap = 5;
-  Progress progress(Progress::Output::silent);
-  const Keyframes keys = select_keyframes(frames, options, progress);
+  const Keyframes keys = select_keyframes(frames, options);
   ASSERT_GE(keys.frames.size(), 3u);
   EXPECT_EQ(keys.frames[1], 2);
   EXPECT_NEAR(keys.mean_flow_px[1], 10.0, 0.8);
@@ -51,12 +55,11 @@ TEST_F(Sequence, AfterTheGapTheFrameFurthestAwayIsTaken) {
 
 TEST_F(Sequence, TheSameForAnyNumberOfThreads) {
   const FrameSource frames = source({3, 9, 2, 7, 7, 1, 12, 3, 3}, plain());
-  Progress progress(Progress::Output::silent);
-  const Keyframes many = select_keyframes(frames, {}, progress);
+  const Keyframes many = select_keyframes(frames, {});
   const int threads = cv::getNumThreads();
   cv::setNumThreads(1);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  const Keyframes single = select_keyframes(frames, {}, progress);
+  const Keyframes single = select_keyframes(frames, {});
   cv::setNumThreads(threads);
   EXPECT_EQ(many.frames, single.frames);
   EXPECT_EQ(many.mean_flow_px, single.mean_flow_px);

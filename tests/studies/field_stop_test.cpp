@@ -11,9 +11,8 @@
 #include "core/files.h"
 #include "dataset/estimate.h"
 #include "dataset/image_io.h"
-#include "recon/keyframes.h"
+#include "recon/frame_follower.h"
 #include "recon/pipeline.h"
-#include "recon/tracks.h"
 #include "render/simulate.h"
 #include "tests/studies/temporary_folder.h"
 #include "validate/evaluate.h"
@@ -61,9 +60,7 @@ TEST_F(FieldStopLoop, NothingOfTheBlackIsReconstructed) {
   options.pictures = false;
   // Tracks, as the pipeline makes them.
   const FrameSource frames(observations, options.preprocess);
-  const Keyframes keys = select_keyframes(frames, options.keyframes, progress_);
-  const Followed followed =
-      follow_tracks(frames, keys, options.align, options.tracks, options.seed, progress_);
+  const Followed followed = follow_frames(frames, options, progress_);
   std::size_t sights = 0;
   for (const Track& track : followed.tracks)
     for (const auto& o : track.observations) {
