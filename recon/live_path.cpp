@@ -14,13 +14,14 @@ void LivePath::take(const TrackChain& chain, int keyframe) {
   Structure& s = structure_;
   const int frame = s.frames[static_cast<std::size_t>(keyframe)];
   const std::vector<int>& through = chain.through(frame);
+  const LensProjector projector(frames_.lens());
   std::size_t& taken = taken_[static_cast<std::size_t>(keyframe)];
   for (; taken < through.size(); ++taken) {
     const auto t = static_cast<std::size_t>(through[taken]);
     if (s.tracks.size() <= t) s.tracks.resize(t + 1);
     const auto& followed = chain.tracks()[t].observations;
     const auto at = std::ranges::find(followed, frame, &Track::Observation::keyframe);
-    const auto ray = ray_of(frames_.lens(), at->pixel);
+    const auto ray = ray_of(projector, at->pixel);
     if (!ray) continue;
     auto& observations = s.tracks[t].observations;
     observations.push_back({keyframe, at->pixel, *ray});

@@ -111,12 +111,13 @@ std::vector<MosaicMember> reachable(const Structure& structure, const Graph& gra
 void refine(const Structure& structure, const Lens& lens, MosaicPlan& plan) {
   const Rigid3& anchor_from_world = structure.cam_from_world[plan.anchor];
   const Eigen::AlignedBox2d bounds = mosaic_bounds(lens);
+  const LensProjector projector(lens);
   std::vector<std::vector<cv::Point2d>> from(plan.members.size()), to(plan.members.size());
   std::map<int, std::size_t> slot;
   for (std::size_t m = 1; m < plan.members.size(); ++m) slot[plan.members[m].keyframe] = m;
   for (const Track& track : structure.tracks) {
     if (!track.triangulated) continue;
-    const auto pixel = lens.project(anchor_from_world * track.point);
+    const auto pixel = projector.project(anchor_from_world * track.point);
     if (!pixel || !bounds.contains(*pixel)) continue;
     for (const Track::Observation& seen : track.observations) {
       const auto found = slot.find(seen.keyframe);

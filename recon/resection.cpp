@@ -76,11 +76,12 @@ Sighted follow(const Lens& lens, const std::vector<Seen>& seen, const AlignImage
                const AlignOptions& align_options, std::uint64_t seed) {
   AlignGuess guess;
   guess.affine = false;
+  const LensProjector projector(lens);
   std::vector<Vec2> from, to;
   for (const Seen& s : seen) {
     guess.reference_points.push_back(s.pixel);
     if (!cam_from_world) continue;
-    const auto there = lens.project(*cam_from_world * s.point);
+    const auto there = projector.project(*cam_from_world * s.point);
     if (!there) continue;
     from.push_back(s.pixel);
     to.push_back(*there);
@@ -91,7 +92,7 @@ Sighted follow(const Lens& lens, const std::vector<Seen>& seen, const AlignImage
                           pair_seed(seed, reference.index, moving.index), guess);
   if (!pair) return sighted;
   for (std::size_t i = 0; i < pair->point_index.size(); ++i) {
-    const auto ray = ray_of(lens, pair->moving_px[i]);
+    const auto ray = ray_of(projector, pair->moving_px[i]);
     if (!ray) continue;
     sighted.points.push_back(seen[pair->point_index[i]].point);
     sighted.rays.push_back(*ray);

@@ -40,6 +40,7 @@ class RollingShutter {
 
   bool rolling() const { return row_time_s_ > 0.0; }
   const Lens& lens() const { return lens_; }
+  const LensProjector& projector() const { return straight_projector_; }  // of lens()
   const Lens& original() const { return original_; }
   /// When the row of a point that the camera sees at p_cam was read, after the frame's time.
   double offset_s(const Vec3& p_cam) const;

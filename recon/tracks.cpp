@@ -57,7 +57,7 @@ void number_keyframes(std::vector<Track>& tracks, const std::vector<int>& keyfra
 
 }  // namespace
 
-std::optional<Vec2> ray_of(const Lens& lens, const Vec2& pixel) {
+std::optional<Vec2> ray_of(const LensProjector& lens, const Vec2& pixel) {
   const auto direction = lens.unproject(pixel);
   if (!direction || !(direction->z() > 0.0)) return std::nullopt;
   return Vec2(direction->head<2>() / direction->z());
@@ -71,9 +71,10 @@ std::uint64_t pair_seed(std::uint64_t seed, int reference, int moving) {
 }
 
 void set_rays(std::vector<Track>& tracks, const Lens& lens) {
+  const LensProjector projector(lens);
   for (Track& track : tracks) {
     std::erase_if(track.observations, [&](Track::Observation& o) {
-      const auto ray = ray_of(lens, o.pixel);
+      const auto ray = ray_of(projector, o.pixel);
       if (ray) o.ray = *ray;
       return !ray;
     });

@@ -16,7 +16,7 @@
 namespace rugae {
 
 /// Ray (x/z, y/z) of a pixel; empty where the lens has none in front of the camera.
-std::optional<Vec2> ray_of(const Lens& lens, const Vec2& pixel);
+std::optional<Vec2> ray_of(const LensProjector& lens, const Vec2& pixel);
 
 /// The seed of a pair's alignment, a function of the run's seed and the two frames alone.
 std::uint64_t pair_seed(std::uint64_t seed, int reference, int moving);

@@ -176,12 +176,13 @@ class Oracle {
         there.push_back(*pixel);
       }
     const auto here = motion_.follow(structure.frames[keyframe], frame, there);
+    const LensProjector projector(frames.lens());
     std::vector<Vec3> seen;
     std::vector<Vec2> rays;
     for (std::size_t i = 0; i < here.size(); ++i) {
       const auto pixel =
           here[i].sight == Sight::seen ? grids.preprocessed(here[i].pixel) : std::nullopt;
-      const auto ray = pixel ? ray_of(frames.lens(), *pixel) : std::nullopt;
+      const auto ray = pixel ? ray_of(projector, *pixel) : std::nullopt;
       if (!ray) continue;
       seen.push_back(points[i]);
       rays.push_back(*ray);

@@ -22,7 +22,7 @@ std::optional<Placement> place_by_patches(const std::vector<const WallPatch*>& p
     const auto sight = foretell(*patch, guess, shutter);
     if (!sight) continue;
     const auto pixel = registrar.find(*patch, *sight, image, reach_px);
-    const auto ray = pixel ? ray_of(lens, *pixel) : std::nullopt;
+    const auto ray = pixel ? ray_of(shutter.projector(), *pixel) : std::nullopt;
     if (!ray) continue;
     const double depth = (guess.cam_from_world * patch->centre).z();
     points.push_back(patch->centre);

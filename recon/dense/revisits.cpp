@@ -59,7 +59,7 @@ std::vector<Seen> agreeing(const std::vector<Seen>& candidates,
     std::vector<Vec2> rays;
     std::vector<std::size_t> which;
     for (std::size_t i = begin; i < end; ++i) {
-      const auto ray = ray_of(shutter.lens(), candidates[i].pixel);
+      const auto ray = ray_of(shutter.projector(), candidates[i].pixel);
       if (!ray) continue;
       const Vec3& point = patches[candidates[i].patch].centre;
       const double depth = (camera.cam_from_world * point).z();

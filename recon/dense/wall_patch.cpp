@@ -102,7 +102,8 @@ Mat2 ray_derivative(const RollingShutter& shutter, const Vec2& pixel, double dep
   if (!shutter.rolling()) return derivative;
   for (int axis = 0; axis < 2; ++axis) {
     const Vec2 step = Vec2::Unit(axis);
-    const auto ahead = ray_of(lens, pixel + step), behind = ray_of(lens, pixel - step);
+    const auto ahead = ray_of(shutter.projector(), pixel + step),
+               behind = ray_of(shutter.projector(), pixel - step);
     if (!ahead || !behind) continue;
     derivative.col(axis) = 0.5 * (shutter.ray_at_frame_time(*ahead, depth, motion) -
                                   shutter.ray_at_frame_time(*behind, depth, motion));

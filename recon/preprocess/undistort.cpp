@@ -25,13 +25,14 @@ bool within_stop(const Lens& lens, const Vec2& pixel) {
 Undistortion::Undistortion(const Lens& from, const Lens& to)
     : valid_(to.height, to.width, CV_8U, cv::Scalar(0)) {
   cv::Mat source_px(to.height, to.width, CV_32FC2);
+  const LensProjector straight(to), seen(from);
   tbb::parallel_for(0, to.height, [&](int y) {
     auto* row = source_px.ptr<cv::Vec2f>(y);
     for (int x = 0; x < to.width; ++x) {
       row[x] = {kNowherePx, kNowherePx};
-      const std::optional<Vec3> ray = to.unproject({x + 0.5, y + 0.5});
+      const std::optional<Vec3> ray = straight.unproject({x + 0.5, y + 0.5});
       if (!ray) continue;
-      const std::optional<Vec2> pixel = from.project(*ray);
+      const std::optional<Vec2> pixel = seen.project(*ray);
       if (!pixel) continue;
       row[x] = {static_cast<float>(pixel->x() - 0.5), static_cast<float>(pixel->y() - 0.5)};
       const double low = 0.5 - kRoundingPx, right = from.width - low, bottom = from.height - low;
