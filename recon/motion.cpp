@@ -50,12 +50,12 @@ Motion estimate_motion(const FrameSource& frames, const ReconOptions& options, c
   const std::size_t before = progress.stages().size();
   // Algorithm 3, step 7, all poses jointly.
   Motion motion = solve_motion(frames, std::move(followed), options, stages, progress);
-  // The one stage that following was on the terminal is known in its parts.
   const auto at = [&](std::size_t i) {
     return progress.stages().begin() + static_cast<std::ptrdiff_t>(i);
   };
   motion.stages.assign(at(earlier), at(before));
-  motion.stages.pop_back();
+  // The one stage that following was on the terminal is known in its parts.
+  if (!following.empty()) motion.stages.pop_back();
   motion.stages.insert(motion.stages.end(), following.begin(), following.end());
   motion.stages.insert(motion.stages.end(), at(before), progress.stages().end());
   return motion;

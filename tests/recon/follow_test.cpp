@@ -4,8 +4,9 @@
 
 #include <algorithm>
 
+#include "core/seconds_of.h"
 #include "image_sequence.h"
-#include "recon/tracks.h"
+#include "recon/frame_follower.h"
 
 namespace rugae {
 namespace {
@@ -14,6 +15,8 @@ using FollowTracks = testing::ImageSequence;
 
 // A shift is followed to less than this over four key frames; a wrong match is off by whole pixels.
 constexpr double kTrackPx = 0.25;
+// Of the time that passes, what is told of; the rest is the loop around it.
+constexpr double kAccountedShare = 0.8;
 
 Followed follow(const FrameSource& frames, const std::vector<int>& keyframes) {
   TrackFollower follower(frames, {}, {}, 1);
@@ -78,6 +81,42 @@ TEST_F(FollowTracks, WhereTheWallIsAnotherTheChainBreaksAndNoKeyFrameComesBetwee
   for (const Track& track : followed.tracks)
     EXPECT_FALSE(track.observations.front().keyframe < 2 &&
                  track.observations.back().keyframe >= 2);
+}
+
+// Looked at one by one, in lots, or all at once; and the parts' times add up to what passed.
+TEST_F(FollowTracks, HoweverManyFramesComeAtATime) {
+  const FrameSource frames =
+      source({3, 9, 12, 14, 2, 7, 7, 1, 12, 3, 15, 14, 13, 4, 4, 4, 4, 4, 6, 9}, plain());
+  std::vector<Followed> found;
+  for (const int lot : {1, 3, kFramesAtOnce, frames.size()}) {
+    FrameFollower follower(frames, {}, lot > 1);
+    const double passed_s = seconds_of([&] {
+      while (follower.looked_at() < frames.size()) {
+        follower.look_at(std::min(follower.looked_at() + lot, frames.size()));
+        if (lot == 1) follower.catch_up();
+      }
+      found.push_back(follower.finish());
+    });
+    double parts_s = 0.0;
+    for (const StageTime& stage : found.back().stages) {
+      EXPECT_TRUE(stage.seconds > 0.0) << stage.name;
+      parts_s += stage.seconds;
+    }
+    EXPECT_TRUE(parts_s <= passed_s && parts_s >= kAccountedShare * passed_s)
+        << parts_s << " of " << passed_s;
+  }
+  ASSERT_GT(found[0].keyframes.size(), 4u);
+  ASSERT_GT(found[0].tracks.size(), 100u);
+  for (const Followed& other : found) {
+    EXPECT_EQ(other.keyframes, found[0].keyframes);
+    ASSERT_EQ(other.tracks.size(), found[0].tracks.size());
+    for (std::size_t t = 0; t < other.tracks.size(); ++t) {
+      const auto &a = other.tracks[t].observations, &b = found[0].tracks[t].observations;
+      ASSERT_EQ(a.size(), b.size());
+      for (std::size_t i = 0; i < a.size(); ++i)
+        EXPECT_TRUE(a[i].keyframe == b[i].keyframe && a[i].pixel == b[i].pixel);
+    }
+  }
 }
 
 }  // namespace
