@@ -7,6 +7,8 @@
 #include <ceres/product_manifold.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/random.h"
 #include "recon/reprojection_cost.h"
 #include "synthetic.h"
@@ -114,6 +116,28 @@ TEST(Bundle, HoldsWhatIsNotFree) {
         (s.cam_from_world[k].translation - world.cam_from_world[k].translation).norm() > 0.0;
     EXPECT_EQ(moved, k == 3 || k == 4) << k;
   }
+}
+
+// Who knows what the free key frames see, and says so, gets the same to the bit.
+TEST(Bundle, KnownTracksChangeNothing) {
+  const synthetic::World world = synthetic::make_world({.cameras = 8, .noise_px = 0.5});
+  Structure looked_for = true_structure(world), known = looked_for;
+  BundleScope scope;
+  scope.free_keyframes = {3, 4};
+  bundle_adjust(looked_for, world.lens.fx, BundleOptions{}, scope);
+  for (std::size_t t = 0; t < known.tracks.size(); ++t)
+    if (std::ranges::any_of(known.tracks[t].observations,
+                            [](const auto& o) { return o.keyframe == 3 || o.keyframe == 4; }))
+      scope.tracks.push_back(t);
+  ASSERT_GT(scope.tracks.size(), 10u);
+  bundle_adjust(known, world.lens.fx, BundleOptions{}, scope);
+  for (int k = 0; k < 8; ++k) {
+    EXPECT_EQ(known.cam_from_world[k].translation, looked_for.cam_from_world[k].translation);
+    EXPECT_EQ(known.cam_from_world[k].rotation.coeffs(),
+              looked_for.cam_from_world[k].rotation.coeffs());
+  }
+  for (std::size_t t = 0; t < known.tracks.size(); ++t)
+    EXPECT_EQ(known.tracks[t].point, looked_for.tracks[t].point);
 }
 
 // One camera fixes no world: the first placed key frame stays where it is, to the bit.
