@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numeric>
 
 #include "recon/reprojection_cost.h"
 #include "recon/schur.h"
@@ -36,6 +37,23 @@ ceres::Solver::Options solver_options(int max_iterations, double function_tolera
   o.logging_type = ceres::SILENT;
   o.max_num_consecutive_invalid_steps = 10;
   return o;
+}
+
+// All tracks that may be adjusted, in order, and perhaps others.
+std::vector<std::size_t> candidates(const Structure& structure, const BundleScope& scope) {
+  std::vector<std::size_t> tracks;
+  if (scope.seen == nullptr || scope.free_keyframes.empty()) {
+    tracks.resize(structure.tracks.size());
+    std::iota(tracks.begin(), tracks.end(), std::size_t{0});
+    return tracks;
+  }
+  for (const int k : scope.free_keyframes) {
+    const std::vector<std::size_t>& of = (*scope.seen)[static_cast<std::size_t>(k)];
+    tracks.insert(tracks.end(), of.begin(), of.end());
+  }
+  std::ranges::sort(tracks);
+  tracks.erase(std::unique(tracks.begin(), tracks.end()), tracks.end());
+  return tracks;
 }
 
 BundleReport report_of(const ceres::Solver::Summary& summary) {
@@ -78,10 +96,8 @@ BundleReport bundle_adjust(Structure& structure, double focal_px, const BundleOp
   std::vector<int> camera_of(n, -1), keyframe_of;  // of the problem; of the structure
   std::vector<Track*> adjusted;
   BundleReport report;
-  const bool known = !scope.tracks.empty();
-  const std::size_t candidates = known ? scope.tracks.size() : structure.tracks.size();
-  for (std::size_t i = 0; i < candidates; ++i) {
-    Track& track = structure.tracks[known ? scope.tracks[i] : i];
+  for (const std::size_t t : candidates(structure, scope)) {
+    Track& track = structure.tracks[t];
     if (!track.triangulated) continue;
     const auto counts = [&](const Track::Observation& o) {
       return o.inlier && structure.placed[o.keyframe];

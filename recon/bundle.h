@@ -19,9 +19,8 @@ struct BundleReport {
 
 /// What to adjust, and how far.
 struct BundleScope {
-  std::vector<int> free_keyframes;  // empty: all that are placed, the first of them held
-  /// In order, all that the free key frames see, where the caller knows them; empty: looked for.
-  std::vector<std::size_t> tracks;
+  std::vector<int> free_keyframes;   // empty: all that are placed, the first of them held
+  const SeenTracks* seen = nullptr;  // where the caller has it: not all tracks are looked through
   int max_iterations = 50;
   double function_tolerance = 1e-6;  // relative change of the cost at which to stop
   double radius = 1e4;               // of the damping, at the first step

@@ -58,20 +58,6 @@ struct Shared {
   std::vector<std::size_t> tracks;
 };
 
-// Of each key frame the tracks it sees, so that nobody looks through all of them for those of one.
-using SeenTracks = std::vector<std::vector<std::size_t>>;
-
-SeenTracks seen_tracks(const Structure& s) {
-  SeenTracks seen(s.frames.size());
-  for (std::size_t t = 0; t < s.tracks.size(); ++t) {
-    for (const auto& o : s.tracks[t].observations) {
-      std::vector<std::size_t>& of = seen[static_cast<std::size_t>(o.keyframe)];
-      if (of.empty() || of.back() != t) of.push_back(t);
-    }
-  }
-  return seen;
-}
-
 // Tracks that both key frames see.
 Shared shared_tracks(const Structure& s, const SeenTracks& seen, int first, int second) {
   Shared shared;
@@ -226,18 +212,6 @@ std::vector<int> known_counts(const Structure& s, const SeenTracks& seen,
   return counts;
 }
 
-// What any of the key frames sees, in order.
-std::vector<std::size_t> seen_by_any(const SeenTracks& seen, const std::vector<int>& keyframes) {
-  std::vector<std::size_t> tracks;
-  for (const int k : keyframes) {
-    const std::vector<std::size_t>& of = seen[static_cast<std::size_t>(k)];
-    tracks.insert(tracks.end(), of.begin(), of.end());
-  }
-  std::ranges::sort(tracks);
-  tracks.erase(std::unique(tracks.begin(), tracks.end()), tracks.end());
-  return tracks;
-}
-
 }  // namespace
 
 void update_points(Structure& structure, double focal_px, double max_px,
@@ -323,7 +297,7 @@ void SegmentGrowth::extend(const std::vector<char>& available, Progress& progres
     } else {
       BundleScope local;
       local.free_keyframes = neighbourhood(s, seen, next);
-      local.tracks = seen_by_any(seen, local.free_keyframes);
+      local.seen = &seen;
       local.max_iterations = kLocalIterations;
       local.function_tolerance = 1e-3;
       bundle_adjust(s, focal_px_, options_, local);

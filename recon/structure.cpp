@@ -157,6 +157,17 @@ int Structure::placed_count() const {
   return static_cast<int>(std::count(placed.begin(), placed.end(), true));
 }
 
+SeenTracks seen_tracks(const Structure& s) {
+  SeenTracks seen(s.frames.size());
+  for (std::size_t t = 0; t < s.tracks.size(); ++t) {
+    for (const auto& o : s.tracks[t].observations) {
+      std::vector<std::size_t>& of = seen[static_cast<std::size_t>(o.keyframe)];
+      if (of.empty() || of.back() != t) of.push_back(t);
+    }
+  }
+  return seen;
+}
+
 void normalise(Structure& s) {
   const auto first = std::find(s.placed.begin(), s.placed.end(), true);
   if (first == s.placed.end()) return;

@@ -43,6 +43,10 @@ struct Structure {
   int placed_count() const;
 };
 
+/// Of each key frame the tracks it sees, in order.
+using SeenTracks = std::vector<std::vector<std::size_t>>;
+SeenTracks seen_tracks(const Structure& structure);
+
 /// How far the joint adjustment of all goes.
 struct Adjustment {
   int rounds;                 // between which the observations are judged anew
