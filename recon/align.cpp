@@ -188,10 +188,12 @@ void refine(const AlignImage& reference, const AlignImage& moving,
   std::vector<std::optional<Vec2>> refined(inliers.size());
   tbb::parallel_for(std::size_t{0}, inliers.size(), [&](std::size_t i) {
     const Match& m = inliers[i];
-    refined[i] =
-        refiner(reference.intensity, moving.intensity, m.reference_px, m.moving_px, m.linear);
-    if (!refined[i])
-      refined[i] = refiner(reference.smooth, moving.smooth, m.reference_px, m.moving_px, m.linear);
+    const auto find = [&](const cv::Mat& from, const cv::Mat& in) {
+      const auto sought = refiner.make_template(from, m.reference_px);
+      return sought ? refiner(*sought, in, m.moving_px, m.linear) : std::nullopt;
+    };
+    refined[i] = find(reference.intensity, moving.intensity);
+    if (!refined[i]) refined[i] = find(reference.smooth, moving.smooth);
   });
   for (std::size_t i = 0; i < inliers.size(); ++i) {
     if (!refined[i]) continue;
@@ -283,7 +285,7 @@ std::optional<PairAlignment> align(const AlignImage& reference, const AlignImage
       const double share = static_cast<double>(inliers.size()) / result.matches;
       if (!(share >= kMinInlierShare)) return std::nullopt;
       result.ref_from_mov_homography = *h;
-      if (guess.affine) fit(reference, moving, inliers, options, scale, result);
+      if (options.affine && guess.affine) fit(reference, moving, inliers, options, scale, result);
     }
     result.inliers += static_cast<int>(inliers.size());
     refine(reference, moving, inliers, options.patch_radius_px * scale,

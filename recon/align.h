@@ -65,7 +65,8 @@ struct AlignGuess {
   /// that tracks chain over many key frames. Points outside the image are never inliers.
   std::vector<Vec2> reference_points;
   cv::Mat flow;  // CV_32FC2, px, a first guess of the flow from reference to moving; may be empty
-  bool affine = true;  // false: correspondences alone are wanted, no affine is fitted
+  bool affine = true;  // false: correspondences alone are wanted, no affine is fitted; as false
+                       // in AlignOptions
   PairFlow measured;   // the flow itself, where the caller has measured it already
 };
 

@@ -11,7 +11,10 @@ namespace rugae {
 
 AlignOptions follow_options(const ReconOptions& options) {
   AlignOptions align = options.align;
-  if (options.method == "dense") align.neighbours = options.revisits.neighbours;
+  if (options.method == "dense") {
+    align.neighbours = options.revisits.neighbours;
+    align.affine = false;  // it goes by the points
+  }
   return align;
 }
 

@@ -40,6 +40,7 @@ struct AlignOptions {
   int max_iterations = 100;
   int min_inliers = 30;  // fewer: the pair cannot be aligned
   int neighbours = 3;    // each key frame is aligned to this many before it
+  bool affine = true;    // by the method, not an option: whether pairs get the paper's affine
   void check() const;
 };
 

@@ -18,27 +18,37 @@ struct PointRefinementOptions {
   double max_deviation_px = 0.25;  // predicted standard deviation of the worse direction
 };
 
-/// Gauss-Newton on the place in `moving` of the patch around `reference_px`, start `moving_px`;
-/// `linear` is the patch's linear map, mov from ref, kept. The squared difference is normalised:
-/// mean and gain of each patch are removed (the light moves with the camera), as in Lucas and
-/// Kanade with affine illumination (Baker and Matthews, IJCV 2004, doi:10.1023/B:VISI.0000011205.
-/// 11775.fd, inverse compositional). Made once for many points: the disc is theirs in common.
-/// Calls are thread-safe.
+/// What is looked for, a disc of a picture: made once, found in many.
+struct PointTemplate {
+  /// Four values, their four derivatives by x and by y, and so on over the disc, filled up with
+  /// zeros; means removed, and from the derivatives what is along the values.
+  std::vector<float> fours;
+  double norm = 0.0;                    // of the values
+  Mat2 inverse_hessian = Mat2::Zero();  // of the squared difference over the place
+  double weakest = 0.0;                 // eigenvalue of the Hessian
+};
+
+/// Gauss-Newton on the place in another picture of the patch around a point; `linear` is the
+/// patch's linear map, mov from ref, kept. The squared difference is normalised: mean and gain of
+/// each patch are removed (the light moves with the camera), as in Lucas and Kanade with affine
+/// illumination (Baker and Matthews, IJCV 2004, doi:10.1023/B:VISI.0000011205.11775.fd, inverse
+/// compositional). Made once for many points: the disc is theirs in common. Calls are thread-safe.
 class PointRefiner {
  public:
   explicit PointRefiner(const PointRefinementOptions& options);
 
-  /// Images are CV_32F. Empty when the patch leaves an image, does not converge, matches badly, or
-  /// its texture does not fix the place.
-  std::optional<Vec2> operator()(const cv::Mat& reference, const cv::Mat& moving,
-                                 const Vec2& reference_px, const Vec2& moving_px,
-                                 const Mat2& linear) const;
+  /// Of a CV_32F picture. Empty when the patch leaves it or has no texture.
+  std::optional<PointTemplate> make_template(const cv::Mat& reference,
+                                             const Vec2& reference_px) const;
+  /// In a CV_32F picture, started at `start_px`. Empty when the patch leaves it, does not converge,
+  /// matches badly, or its texture does not fix the place.
+  std::optional<Vec2> operator()(const PointTemplate& sought, const cv::Mat& moving,
+                                 const Vec2& start_px, const Mat2& linear) const;
 
  private:
-  struct Template;
-  bool make_template(const cv::Mat& reference, const Vec2& center, Template& t) const;
-  bool sample(const cv::Mat& image, const Vec2& place, const Mat2& linear,
-              std::vector<float>& values) const;
+  struct Comparison;
+  std::optional<Comparison> compare(const PointTemplate& sought, const cv::Mat& image,
+                                    const Vec2& place, const Mat2& linear) const;
 
   PointRefinementOptions options_;
   int radius_ = 0;              // whole px

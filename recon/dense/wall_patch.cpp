@@ -21,13 +21,19 @@ constexpr int kPlaneRounds = 3;         // of weighing down what lies off it
 constexpr double kPlaneShare = 0.03;    // of the depth: points further off the plane count less
 constexpr double kMinIncidence = 0.26;  // cosine, 75 degrees: more oblique pieces show nothing
 constexpr double kMinScale = 0.5, kMaxScale = 2.0;
-constexpr int kFineHalfPx = 17;      // of the squares that are kept: a patch, its gradient
-constexpr int kCoarseHalfPx = 10;    // half a search template seen at half its size
+constexpr int kCoarseHalfPx = 10;    // of the squares kept: a search template at half its size
 constexpr std::size_t kAtOnce = 16;  // key frames held at a time
 /// In a picture narrower than this noise hides the texture of a patch; smoothed, three times as
 /// many are registered.
 constexpr int kNarrowPx = 320;
 constexpr double kSmoothingPx = 0.8;
+
+constexpr double kReferenceWidthPx = 640.0;
+constexpr double kRadiusPx = 12.0;       // of the registration, at 640 px width
+constexpr double kMaxMotionPx = 4.0;     // from its start, likewise
+constexpr double kLeastRadiusPx = 7.0;   // of any picture: fewer pixels fix no place, as for tracks
+constexpr double kLeastMotionPx = 2.5;   // likewise: their places are no nearer in pixels
+constexpr double kMinCorrelation = 0.7;  // of what is then judged by consensus
 
 struct Point {
   int track;
@@ -112,9 +118,10 @@ Mat2 ray_derivative(const RollingShutter& shutter, const Vec2& pixel, double dep
 }
 
 // Of one key frame: the patches anchored in it.
-std::vector<WallPatch> patches_of(const PatchImage& image, const RollingShutter& shutter,
-                                  const CameraMotion& motion, const Structure& structure,
-                                  int keyframe, const std::vector<Point>& points,
+std::vector<WallPatch> patches_of(const PatchImage& image, const PointRefiner& refiner,
+                                  const RollingShutter& shutter, const CameraMotion& motion,
+                                  const Structure& structure, int keyframe,
+                                  const std::vector<Point>& points,
                                   const std::vector<char>& anchored) {
   std::vector<WallPatch> patches;
   const Rigid3 world_from_cam = structure.cam_from_world[keyframe].inverse();
@@ -143,8 +150,9 @@ std::vector<WallPatch> patches_of(const PatchImage& image, const RollingShutter&
     const Mat2 rays = ray_derivative(shutter, p.pixel, z, motion);
     patch.along_x = along_ray_x * rays(0, 0) + along_ray_y * rays(1, 0);
     patch.along_y = along_ray_x * rays(0, 1) + along_ray_y * rays(1, 1);
-    if (!cut(image.fine, p.pixel / image.fine_shrink, kFineHalfPx, patch.fine, patch.fine_px))
-      continue;
+    auto fine = refiner.make_template(image.fine, p.pixel / image.fine_shrink);
+    if (!fine) continue;
+    patch.fine = std::move(*fine);
     if (!cut(image.coarse, p.pixel / image.coarse_shrink, kCoarseHalfPx, patch.coarse,
              patch.coarse_px))
       patch.coarse.release();  // near the border: followed, but not looked for
@@ -178,6 +186,15 @@ PatchImage prepare_patch_image(const Frame& frame) {
   image.coarse = even_light(small, valid == 255);
   image.usable = frame.valid & ~frame.reflection;
   return image;
+}
+
+PointRefinementOptions patch_refinement(const Lens& lens) {
+  const double scale = std::min(lens.width, kFineWidthPx) / kReferenceWidthPx;
+  PointRefinementOptions options;
+  options.radius_px = std::max(kLeastRadiusPx, kRadiusPx * scale);
+  options.max_motion_px = std::max(kLeastMotionPx, kMaxMotionPx * scale);
+  options.min_correlation = kMinCorrelation;
+  return options;
 }
 
 std::optional<PatchSight> foretell(const WallPatch& patch, const MovingPose& camera,
@@ -220,13 +237,14 @@ std::vector<WallPatch> make_patches(const FrameSource& frames, const Structure& 
     }
   }
   const std::vector<CameraMotion> motions = keyframe_motions(frames, structure);
+  const PointRefiner refiner(patch_refinement(frames.lens()));
   std::vector<std::vector<WallPatch>> found(n);
   for (std::size_t begin = 0; begin < n; begin += kAtOnce) {
     tbb::parallel_for(begin, std::min(n, begin + kAtOnce), [&](std::size_t k) {
       if (!structure.placed[k] || points[k].empty()) return;
       const PatchImage image = prepare_patch_image(frames.pose_frame(structure.frames[k]));
-      found[k] = patches_of(image, frames.shutter(), motions[k], structure, static_cast<int>(k),
-                            points[k], anchored[k]);
+      found[k] = patches_of(image, refiner, frames.shutter(), motions[k], structure,
+                            static_cast<int>(k), points[k], anchored[k]);
     });
   }
   std::vector<WallPatch> patches;

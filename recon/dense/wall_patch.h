@@ -9,6 +9,7 @@
 #include "core/progress.h"
 #include "core/rigid3.h"
 #include "recon/preprocess/preprocess.h"
+#include "recon/refine.h"
 #include "recon/structure.h"
 
 namespace rugae {
@@ -28,6 +29,9 @@ inline constexpr int kCoarseWidthPx = 160;
 
 PatchImage prepare_patch_image(const Frame& frame);
 
+/// By which patches are cut from fine images and registered in them, for this lens.
+PointRefinementOptions patch_refinement(const Lens& lens);
+
 /// A piece of wall around a track's point.
 struct WallPatch {
   int track = -1, anchor = -1;  // places in Structure::tracks, Structure::frames
@@ -36,8 +40,7 @@ struct WallPatch {
   Vec3 along_x, along_y;          // d wall / d pixel of the anchor, on the tangent plane
   Vec3 normal;                    // world, unit length, towards the anchor's camera
   double normal_sigma_rad = 0.0;  // by what the points around stray from the tangent plane
-  cv::Mat fine;                   // CV_32F square of the anchor
-  Vec2 fine_px;                   // the point in it
+  PointTemplate fine;             // of the anchor's fine image
   cv::Mat coarse;                 // CV_8U square of the anchor's coarse image
   Vec2 coarse_px;                 // the point in it
 };
