@@ -14,7 +14,7 @@ namespace rugae {
 namespace {
 
 constexpr double kReferenceWidthPx = 640.0;  // of the threshold
-constexpr int kWorkWidthPx = 320;            // the mean magnitude needs no finer flow than this
+constexpr int kWorkWidthPx = 160;            // the mean magnitude needs no finer flow than this
 constexpr int kPreparedAtOnce = 8;           // frames
 
 // Over the valid pixels.
