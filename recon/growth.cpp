@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "recon/bundle.h"
 #include "recon/resection.h"
@@ -171,17 +172,36 @@ std::vector<int> neighbourhood(const Structure& s, const SeenTracks& seen, int k
   return order;
 }
 
+// Known points that each key frame sees.
+std::vector<int> known_counts(const Structure& s, const SeenTracks& seen) {
+  std::vector<int> counts(s.frames.size(), 0);
+  for (std::size_t k = 0; k < counts.size(); ++k)
+    counts[k] = static_cast<int>(
+        std::ranges::count_if(seen[k], [&](std::size_t t) { return s.tracks[t].triangulated; }));
+  return counts;
+}
+
+// One point more for each key frame that sees it.
+void count(const Track& track, std::vector<int>& counts) {
+  int last = -1;
+  for (const auto& o : track.observations)
+    if (std::exchange(last, o.keyframe) != o.keyframe) ++counts[o.keyframe];
+}
+
+// New points are counted.
 void triangulate_seen(Structure& s, const SeenTracks& seen, int keyframe, double focal_px,
-                      double max_px, const BundleOptions& options) {
+                      double max_px, const BundleOptions& options, std::vector<int>& counts) {
   for (const std::size_t t : seen[static_cast<std::size_t>(keyframe)]) {
     Track& track = s.tracks[t];
     for (auto& o : track.observations) {
       if (o.keyframe != keyframe) continue;
-      if (!track.triangulated)
-        triangulate_track(s, track, focal_px, max_px, options);
-      else
+      if (track.triangulated) {
         o.inlier =
             reprojection_px(s.cam_from_world[keyframe], track.point, o.ray, focal_px) <= max_px;
+      } else {
+        triangulate_track(s, track, focal_px, max_px, options);
+        if (track.triangulated) count(track, counts);
+      }
       break;
     }
   }
@@ -199,17 +219,6 @@ void begin_with(Structure& s, const Start& start, const BundleOptions& options) 
     track.point = start.view.points[i];
     track.triangulated = true;
   }
-}
-
-// Points seen by each key frame that is available and not placed.
-std::vector<int> known_counts(const Structure& s, const SeenTracks& seen,
-                              const std::vector<char>& available) {
-  std::vector<int> counts(s.frames.size(), 0);
-  for (std::size_t k = 0; k < counts.size(); ++k)
-    if (available[k] && !s.placed[k])
-      counts[k] = static_cast<int>(
-          std::ranges::count_if(seen[k], [&](std::size_t t) { return s.tracks[t].triangulated; }));
-  return counts;
 }
 
 }  // namespace
@@ -271,10 +280,11 @@ void SegmentGrowth::extend(const std::vector<char>& available, Progress& progres
   const double max_px = kOutlierHubers * options_.huber_px;
   const SeenTracks seen = seen_tracks(s);
   tried_.resize(s.frames.size(), 0);
+  std::vector<int> counts = known_counts(s, seen);
   for (;;) {
-    const std::vector<int> counts = known_counts(s, seen, available);
     int next = -1;
     for (int k = 0; k < static_cast<int>(counts.size()); ++k) {
+      if (!available[k] || s.placed[k]) continue;
       if (counts[k] < options_.min_resection_inliers || counts[k] <= tried_[k]) continue;
       if (next < 0 || counts[k] > counts[next]) next = k;
     }
@@ -291,9 +301,10 @@ void SegmentGrowth::extend(const std::vector<char>& available, Progress& progres
     s.cam_from_world[next] = placement->cam_from_world;
     ++placed_;
     progress.step();
-    triangulate_seen(s, seen, next, focal_px_, max_px, options_);
+    triangulate_seen(s, seen, next, focal_px_, max_px, options_, counts);
     if (placed_ >= kGlobalGrowth * placed_at_global_) {
       adjust_globally();
+      counts = known_counts(s, seen);
     } else {
       BundleScope local;
       local.free_keyframes = neighbourhood(s, seen, next);
