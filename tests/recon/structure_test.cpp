@@ -110,6 +110,16 @@ TEST(Structure, LongPathKeepsTogether) {
   EXPECT_TRUE(error.rmse <= 0.01 * error.path_extent) << error.rmse;
 }
 
+// No key frame sees what the start saw but its next neighbours: each goes by the points of the one
+// before.
+TEST(Structure, ShortTracksMakeOnePathToo) {
+  const World world = make_world({.cameras = 40, .points = 20000, .max_run = 4});
+  const Structure s = build(world);
+  const auto error = path_error(s, world);
+  EXPECT_EQ(error.cameras, 40);
+  EXPECT_TRUE(error.rmse <= kExact * error.path_extent) << error.rmse;
+}
+
 TEST(Structure, LengthsAndPlaceOfTheWorldDoNotMatter) {
   const Structure a = build(make_world({.noise_px = 0.2}));
   const Rigid3 moved(Quat(Eigen::AngleAxisd(1.1, Vec3(1, 2, 3).normalized())),
