@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "core/check.h"
 #include "core/float4.h"
 
 namespace rugae {
@@ -188,6 +189,9 @@ std::optional<PointRefiner::Comparison> PointRefiner::compare(const PointTemplat
 
 std::optional<Vec2> PointRefiner::operator()(const PointTemplate& sought, const cv::Mat& moving,
                                              const Vec2& start_px, const Mat2& linear) const {
+  check(sought.fours.size() == kLists * dx_.size(),
+        "point refinement: the template has {} numbers, expected {} of this radius",
+        sought.fours.size(), kLists * dx_.size());
   Vec2 place = start_px;
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
     if (!place.allFinite()) return std::nullopt;

@@ -40,7 +40,8 @@ class PointRefiner {
   /// Of a CV_32F picture. Empty when the patch leaves it or has no texture.
   std::optional<PointTemplate> make_template(const cv::Mat& reference,
                                              const Vec2& reference_px) const;
-  /// In a CV_32F picture, started at `start_px`. Empty when the patch leaves it, does not converge,
+  /// In a CV_32F picture, started at `start_px`; the template is of a refiner with this radius, or
+  /// Error is thrown. Empty when the patch leaves it, does not converge,
   /// matches badly, or its texture does not fix the place.
   std::optional<Vec2> operator()(const PointTemplate& sought, const cv::Mat& moving,
                                  const Vec2& start_px, const Mat2& linear) const;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <vector>
 
 #include "core/float4.h"
@@ -85,17 +84,16 @@ Float4 products(const SearchSquare& square, const float* p, int stride) {
   return even + odd;
 }
 
-// Where the parabola through a maximum and the eight around it peaks, from the maximum, in pixels:
-// derivatives by differences, the mixed one too, for the ridges of a wall's pattern are slanted.
-Vec2 peak_offset(const std::function<double(int, int)>& at) {
-  const double middle = at(0, 0);
-  const Vec2 slope(0.5 * (at(1, 0) - at(-1, 0)), 0.5 * (at(0, 1) - at(0, -1)));
-  const double xx = at(1, 0) - 2.0 * middle + at(-1, 0), yy = at(0, 1) - 2.0 * middle + at(0, -1);
-  const double xy = 0.25 * (at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1));
+// Where the parabola through a maximum, the middle of `at(y, x)`, and the eight around it peaks,
+// from the maximum, in pixels: derivatives by differences, the mixed one too, for the ridges of a
+// wall's pattern are slanted.
+Vec2 peak_offset(const Mat3& at) {
+  const double x_slope = 0.5 * (at(1, 2) - at(1, 0)), y_slope = 0.5 * (at(2, 1) - at(0, 1));
+  const double xx = at(1, 2) - 2.0 * at(1, 1) + at(1, 0), yy = at(2, 1) - 2.0 * at(1, 1) + at(0, 1);
+  const double xy = 0.25 * (at(2, 2) - at(0, 2) - at(2, 0) + at(0, 0));
   const double determinant = xx * yy - xy * xy;
   if (!(xx < 0.0 && determinant > 0.0)) return Vec2::Zero();
-  const Vec2 offset =
-      Vec2(xy * slope.y() - yy * slope.x(), xy * slope.x() - xx * slope.y()) / determinant;
+  const Vec2 offset = Vec2(xy * y_slope - yy * x_slope, xy * x_slope - xx * y_slope) / determinant;
   // Further off, it is not this parabola's.
   return offset.cwiseAbs().maxCoeff() <= 1.0 ? offset : Vec2(Vec2::Zero());
 }
@@ -138,8 +136,12 @@ std::optional<SearchHit> search_square(const SearchSquare& square, const cv::Mat
     if (score(x, y) > score(best_x, best_y)) best_x = x, best_y = y;
   }
   SearchHit hit{Vec2(best_x, best_y), score(best_x, best_y)};
-  if (best_x > 0 && best_x + 1 < columns && best_y > 0 && best_y + 1 < rows)
-    hit.centre_px += peak_offset([&](int dx, int dy) { return score(best_x + dx, best_y + dy); });
+  if (best_x > 0 && best_x + 1 < columns && best_y > 0 && best_y + 1 < rows) {
+    Mat3 around;
+    for (int y = 0; y < 3; ++y)
+      for (int x = 0; x < 3; ++x) around(y, x) = score(best_x + x - 1, best_y + y - 1);
+    hit.centre_px += peak_offset(around);
+  }
   hit.centre_px += Vec2(window.x + kSearchHalfPx + 0.5, window.y + kSearchHalfPx + 0.5);
   return hit;
 }

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <opencv2/core.hpp>
 
+#include "core/check.h"
 #include "core/random.h"
 #include "recon/patch_align.h"
 #include "recon/refine.h"
@@ -173,6 +174,16 @@ TEST(RefinePoint, RefusesWhatItCannotPlace) {
   EXPECT_FALSE(refine_point(reference, other, p, p, Mat2::Identity(), {}));
   EXPECT_FALSE(refine_point(reference, reference, {3.0, 3.0}, {3.0, 3.0}, Mat2::Identity(), {}));
   EXPECT_TRUE(refine_point(reference, reference, p, p, Mat2::Identity(), {}));
+}
+
+TEST(RefinePoint, RefusesATemplateOfAnotherRadius) {
+  const cv::Mat picture = draw(kWidth, kHeight, Texture(5));
+  const Vec2 p(100.5, 100.5);
+  const PointRefiner small({.radius_px = 7.0}), large({.radius_px = 12.0});
+  const auto sought = small.make_template(picture, p);
+  ASSERT_TRUE(sought);
+  EXPECT_TRUE(small(*sought, picture, p, Mat2::Identity()));
+  EXPECT_THROW(large(*sought, picture, p, Mat2::Identity()), Error);
 }
 
 TEST(Align, RecoversAffineHomographyAndCorrespondences) {
