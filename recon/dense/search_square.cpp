@@ -137,10 +137,10 @@ std::optional<SearchHit> search_square(const SearchSquare& square, const cv::Mat
   }
   SearchHit hit{Vec2(best_x, best_y), score(best_x, best_y)};
   if (best_x > 0 && best_x + 1 < columns && best_y > 0 && best_y + 1 < rows) {
-    Mat3 around;
+    Mat3 nine;
     for (int y = 0; y < 3; ++y)
-      for (int x = 0; x < 3; ++x) around(y, x) = score(best_x + x - 1, best_y + y - 1);
-    hit.centre_px += peak_offset(around);
+      for (int x = 0; x < 3; ++x) nine(y, x) = score(best_x + x - 1, best_y + y - 1);
+    hit.centre_px += peak_offset(nine);
   }
   hit.centre_px += Vec2(window.x + kSearchHalfPx + 0.5, window.y + kSearchHalfPx + 0.5);
   return hit;
