@@ -10,18 +10,19 @@
 namespace rugae {
 namespace {
 
-constexpr int kBlocks = 16;             // of the jackknife
-constexpr int kRounds = 30;             // of weights and q in turn, at most
-constexpr double kSettled = 1e-5;       // share of q that a round moves it by
+constexpr int kBlocks = 16;        // of the jackknife
+constexpr int kRounds = 30;        // of weights and q in turn, at most
+constexpr double kSettled = 1e-4;  // share of q that a round moves it by
+/// Of incidence: ln cos is so steep beyond that a few tilts drive the rounds apart.
+constexpr double kLeastCosine = 0.2;
 constexpr double kSigmaOfMad = 1.4826;  // of normal errors
 constexpr double kWidthSpreads = 2.0;   // of the robust weights
 constexpr double kLeastSpread = 1e-3;   // less is rounding of 8 bits
 constexpr double kFirstSpread = 0.03;   // of ln light, before it is known
 /// For a slope the light is moved by this share of the wall's distance.
 constexpr double kStepShare = 1e-4;
-constexpr double kRidge = 1e-8;       // of all weights: gains are known up to a common factor
 constexpr std::size_t kFewest = 500;  // sights that say anything
-constexpr int kShared = 4;            // columns besides q's: powers of r^2, the wet layer's
+constexpr int kShared = 6;            // columns besides q's: powers of r^2, off centre, wet layer
 
 /// Normal equations in the columns gains, fall-off, q.
 struct Sums {
@@ -76,7 +77,9 @@ class Fit {
   int gains() const { return gains_; }
   double spread() const { return spread_; }
 
-  void linearise(double q, double step_q) {
+  /// q's column counts in `unit_q`, so that the equations are the same in every map unit.
+  void linearise(double q, double unit_q) {
+    const double step_q = kStepShare * unit_q;
     tbb::parallel_for(std::size_t{0}, sights_.size(), [&](std::size_t i) {
       LightSight sight = sights_[i];
       const Vec2& tilt = tilt_[track_of_[i]];
@@ -86,20 +89,21 @@ class Fit {
       const auto at = received_light(sight, lights_, q),
                  ahead = received_light(sight, lights_, q + step_q),
                  behind = received_light(sight, lights_, q - step_q);
-      if (!at || !ahead || !behind) {
+      // The way in, from where most of the light comes.
+      const double in = at ? sight.normal_cam.dot(at->per_normal.normalized()) : 0.0;
+      if (!(in >= kLeastCosine) || !ahead || !behind) {
         weight_[i] = 0.0;  // turned away from the light, as far as is known
         return;
       }
       if (weight_[i] == 0.0) weight_[i] = 1.0;
-      const double r2 = sight.radius * sight.radius;
-      // The way in, from where most of the light comes, and the way out.
-      const double in = sight.normal_cam.dot(at->per_normal.normalized());
+      const double r2 = sight.off_axis.squaredNorm();
       const double out = -sight.normal_cam.dot(sight.p_cam.normalized());
-      shared_[i] << r2, r2 * r2, r2 * r2 * r2, std::pow(1.0 - in, 5) + std::pow(1.0 - out, 5),
-          (ahead->ln - behind->ln) / (2.0 * step_q);
+      shared_[i] << r2, r2 * r2, r2 * r2 * r2, sight.off_axis,
+          std::pow(1.0 - in, 5) + std::pow(1.0 - out, 5),
+          (ahead->ln - behind->ln) / (2.0 * kStepShare);
       own_[i] = {1.0, at->per_normal.dot(sight.tangent_x_cam),
                  at->per_normal.dot(sight.tangent_y_cam)};
-      left_[i] = sight.ln_level - at->ln;
+      left_[i] = sight.ln_level - at->ln - 4.0 * std::log(sight.p_cam.normalized().z());
     });
   }
 
@@ -147,9 +151,10 @@ class Fit {
     return spread_ * spread_ / (track.normal_sigma_rad * track.normal_sigma_rad);
   }
   Mat3 own_inverse(const Track& track) const {
-    Mat3 normal = Vec3(kRidge, tilt_precision(track), tilt_precision(track)).asDiagonal();
+    Mat3 normal = Vec3(0.0, tilt_precision(track), tilt_precision(track)).asDiagonal();
     for (std::size_t i = track.begin; i < track.end; ++i)
       normal += weight_[i] * own_[i] * own_[i].transpose();
+    if (!(normal(0, 0) > 0.0)) return Mat3::Zero();  // no sight of it is lit
     return normal.inverse();
   }
 
@@ -186,16 +191,22 @@ class Fit {
   std::vector<Track> tracks_;
   std::vector<Shared> shared_;
   std::vector<Own> own_;
-  std::vector<double> left_, weight_;  // ln level less ln light; robust
+  std::vector<double> left_, weight_;  // ln level less what is known; robust
   std::vector<std::size_t> track_of_;  // of each sight
   std::vector<Vec2> tilt_;             // of each track's normal, rad
   double spread_ = kFirstSpread;
 };
 
+// Gains are known up to a common factor: their mean is 0, and so is a gain of which nothing is
+// known.
 std::optional<Eigen::VectorXd> solve(const Eigen::MatrixXd& h, const Eigen::VectorXd& g,
                                      int gains) {
   Eigen::MatrixXd whole = h.selfadjointView<Eigen::Upper>();
-  whole.diagonal().head(gains).array() += kRidge * h.diagonal().head(gains).sum();
+  auto of_gains = whole.topLeftCorner(gains, gains);
+  const double mean = of_gains.diagonal().mean();
+  for (int k = 0; k < gains; ++k)
+    if (!(of_gains(k, k) > 0.0)) of_gains(k, k) = mean;
+  of_gains.array() += mean / gains;
   const Eigen::LDLT<Eigen::MatrixXd> solver(whole);
   Eigen::VectorXd x = solver.solve(g);
   return x.allFinite() ? std::optional(std::move(x)) : std::nullopt;
@@ -206,7 +217,7 @@ struct LightFit {
 };
 
 // Delete-a-group jackknife (Miller 1974, doi:10.1093/biomet/61.1.1) about the settled fit: how q
-// moves when a block's equations are left out.
+// moves when a block's equations are left out, in the unit of its column.
 std::optional<double> jackknife(const std::vector<Sums>& blocks, const Sums& all, int gains) {
   std::vector<double> without;
   for (const Sums& block : blocks) {
@@ -224,14 +235,14 @@ std::optional<double> jackknife(const std::vector<Sums>& blocks, const Sums& all
 }
 
 std::optional<LightFit> fit_light(const std::vector<LightSight>& sights,
-                                  const std::vector<Emitter>& lights, double step_q,
+                                  const std::vector<Emitter>& lights, double unit_q,
                                   double normal_sigma_factor) {
   Fit fit(sights, lights, normal_sigma_factor);
   LightFit found;
   std::vector<Sums> blocks;
   Sums all;
   for (int round = 0; round < kRounds; ++round) {
-    fit.linearise(found.q, step_q);
+    fit.linearise(found.q, unit_q);
     blocks = fit.sums();
     all = blocks[0];
     for (std::size_t b = 1; b < blocks.size(); ++b) {
@@ -240,14 +251,14 @@ std::optional<LightFit> fit_light(const std::vector<LightSight>& sights,
     }
     const auto x = solve(all.h, all.g, fit.gains());
     if (!x) return std::nullopt;
-    const double moved = (*x)[x->size() - 1];
+    const double moved = unit_q * (*x)[x->size() - 1];
     fit.judge(*x);
     found.q += moved;
     if (std::abs(moved) <= kSettled * std::abs(found.q)) break;
   }
   const auto sigma_q = jackknife(blocks, all, fit.gains());
   if (!sigma_q || !std::isfinite(found.q)) return std::nullopt;
-  found.sigma_q = *sigma_q;
+  found.sigma_q = unit_q * *sigma_q;
   found.spread_ln = fit.spread();
   return found;
 }
@@ -282,11 +293,11 @@ std::optional<LightScale> scale_from_light(const std::vector<LightSight>& sights
   for (const LightSight& sight : sights) depths.push_back(sight.p_cam.z());
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
-  const double step_q = kStepShare * *middle / beside_mm;
+  const double unit_q = *middle / beside_mm;
 
-  const auto found = fit_light(sights, lights, step_q, 1.0);
-  const auto stiffer = fit_light(sights, lights, step_q, 1.0 / kNormalSigmaFactor);
-  const auto looser = fit_light(sights, lights, step_q, kNormalSigmaFactor);
+  const auto found = fit_light(sights, lights, unit_q, 1.0);
+  const auto stiffer = fit_light(sights, lights, unit_q, 1.0 / kNormalSigmaFactor);
+  const auto looser = fit_light(sights, lights, unit_q, kNormalSigmaFactor);
   if (!found || !stiffer || !looser || !(found->q > 0.0)) return std::nullopt;
   const auto [least, most] = std::minmax({found->q, stiffer->q, looser->q});
   LightScale scale;

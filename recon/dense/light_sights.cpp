@@ -70,11 +70,11 @@ std::vector<LightSight> light_sights(const FrameSource& frames, const Structure&
             light.at<float>(static_cast<int>(pixel->y()), static_cast<int>(pixel->x()));
         const Vec3 normal_cam = pose.rotation * patch.normal;
         if (!(level > 0.0) || !(-normal_cam.dot(p_cam->normalized()) >= kMinCosine)) continue;
-        const Vec2 off_axis = *pixel - Vec2(lens.cx, lens.cy);
+        const Vec2 off_axis = (*pixel - Vec2(lens.cx, lens.cy)) / half_diagonal_px;
         const Vec3 tangent = patch.normal.unitOrthogonal();
         found[k].push_back({patch.track, static_cast<int>(k), std::log(level), *p_cam, normal_cam,
                             pose.rotation * tangent, pose.rotation * patch.normal.cross(tangent),
-                            patch.normal_sigma_rad, off_axis.norm() / half_diagonal_px});
+                            patch.normal_sigma_rad, off_axis});
       }
     });
   }

@@ -16,7 +16,7 @@ struct LightSight {
   Vec3 normal_cam;                    // unit, towards the camera
   Vec3 tangent_x_cam, tangent_y_cam;  // unit, the same two of the wall in every key frame
   double normal_sigma_rad = 0.0;
-  double radius = 0.0;  // in the picture, from the principal point, over half the diagonal
+  Vec2 off_axis = Vec2::Zero();  // in the picture, from the principal point, over half the diagonal
 };
 
 /// Of all patches in all key frames that hold their tracks: the mean of the channel that a wet red

@@ -16,10 +16,12 @@ struct World {
   double noise_ln = 0.0;          // of the level, each sight on its own
   double normal_error_rad = 0.0;  // of what is thought of a track's normal
   Vec3 lamp_mm{3.0, 0.0, 0.0};
+  Vec2 uneven = Vec2::Zero();  // d ln light / d tangent across the picture
   std::uint64_t seed = 1;
 };
 
 constexpr int kCameras = 60, kPoints = 1500;
+constexpr double kSettled = 1e-5;  // of a length: where the rounds end
 
 Rigid3 cam_from_world_mm(int camera) {
   const double a = 0.05 * camera;
@@ -50,17 +52,20 @@ std::vector<LightSight> sights_of(const World& world) {
     for (int k = 0; k < kCameras; ++k) {
       const Rigid3 pose = cam_from_world_mm(k);
       const Vec3 p_mm = pose * (40.0 * outward);
-      const double off_axis = p_mm.head<2>().norm() / p_mm.z();
+      const Vec2 off_axis = p_mm.head<2>() / p_mm.z();
       const Vec3 normal_cam = pose.rotation * normal;
-      if (!(p_mm.z() > 0.0 && off_axis < 1.0) || -normal_cam.dot(p_mm.normalized()) < 0.4) continue;
+      if (!(p_mm.z() > 0.0 && off_axis.norm() < 1.0) || -normal_cam.dot(p_mm.normalized()) < 0.4)
+        continue;
       const Vec3 from_lamp = p_mm - world.lamp_mm;
       const double light = -normal_cam.dot(from_lamp.normalized()) / from_lamp.squaredNorm();
       if (!(light > 0.0)) continue;
       const auto draws = random_normal(world.seed, Purpose::test, 10 + k, i);
-      const double gain = 0.2 * std::sin(0.7 * k), r2 = off_axis * off_axis;
+      const double gain = 0.2 * std::sin(0.7 * k);
+      const double r2 = off_axis.squaredNorm();
+      const double fall_off = 4.0 * std::log(p_mm.normalized().z()) - 0.2 * r2 - 0.05 * r2 * r2 +
+                              world.uneven.dot(off_axis);
       sights.push_back({i, k,
-                        ln_albedo + gain - 0.2 * r2 - 0.05 * r2 * r2 + std::log(light) +
-                            world.noise_ln * draws[0],
+                        ln_albedo + gain + fall_off + std::log(light) + world.noise_ln * draws[0],
                         p_mm / world.mm_per_unit, pose.rotation * thought, pose.rotation * tangent,
                         pose.rotation * thought.cross(tangent), world.normal_error_rad, off_axis});
     }
@@ -109,8 +114,8 @@ TEST(LightScale, ExactLightGivesExactMillimetres) {
     world.mm_per_unit = mm_per_unit;
     const auto scale = scale_from_light(sights_of(world), lamp_of(world));
     ASSERT_TRUE(scale.has_value());
-    EXPECT_NEAR(scale->mm_per_unit / mm_per_unit, 1.0, 1e-4);
-    EXPECT_LE(scale->sigma_share, 1e-3);
+    EXPECT_NEAR(scale->mm_per_unit / mm_per_unit, 1.0, kSettled);
+    EXPECT_LE(scale->sigma_share, 1e-4);
   }
 }
 
@@ -138,6 +143,39 @@ TEST(LightScale, KnowsHowFarItIsOff) {
   EXPECT_GE(within_two, 36);
   EXPECT_GE(std::sqrt(square), 0.5);  // nor does it say much less than it knows
   EXPECT_LE(std::sqrt(square), 1.5);
+}
+
+// Where the wall lies nearly along the light, ln cos is so steep that few such places, seen not
+// quite as they are, would drive the rounds apart.
+TEST(LightScale, GrazingLightMovesLittle) {
+  World world;
+  world.noise_ln = 0.003;
+  std::vector<LightSight> sights = sights_of(world);
+  const auto clean = scale_from_light(sights, lamp_of(world));
+  for (LightSight& sight : sights) {
+    if (sight.track % 20 != 0) continue;
+    const double cosine = 0.02 + 0.002 * (sight.keyframe % 10);
+    sight.p_cam = Vec3(-1.0, 0.0, 6.0) / world.mm_per_unit;
+    const Vec3 from_lamp = (sight.p_cam - world.lamp_mm / world.mm_per_unit).normalized();
+    const Vec3 across = Vec3::UnitY().cross(from_lamp).normalized();
+    sight.normal_cam = -cosine * from_lamp + std::sqrt(1.0 - cosine * cosine) * across;
+    sight.tangent_x_cam = Vec3::UnitY();
+    sight.tangent_y_cam = sight.normal_cam.cross(sight.tangent_x_cam);
+    sight.ln_level = -7.0 + 0.1 * (sight.keyframe % 7);
+  }
+  const auto spoilt = scale_from_light(sights, lamp_of(world));
+  ASSERT_TRUE(clean.has_value() && spoilt.has_value());
+  EXPECT_LE(std::abs(spoilt->mm_per_unit / clean->mm_per_unit - 1.0), spoilt->sigma_share);
+  EXPECT_LE(spoilt->sigma_share, 2.0 * clean->sigma_share);
+}
+
+// As a lens that sits a little aside does; a lamp aside does so too, but not everywhere alike.
+TEST(LightScale, APictureBrighterOnOneSideIsNotALampAside) {
+  World world;
+  world.uneven = {0.02, -0.01};
+  const auto scale = scale_from_light(sights_of(world), lamp_of(world));
+  ASSERT_TRUE(scale.has_value());
+  EXPECT_NEAR(scale->mm_per_unit / world.mm_per_unit, 1.0, kSettled);
 }
 
 // By less than what it is uncertain by anyway.
