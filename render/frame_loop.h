@@ -27,7 +27,7 @@ class FrameLoop {
   /// What a frame passes on its way. All of it must outlive the loop.
   struct Stages {
     const FrameRenderer& renderer;
-    const Motion& motion;
+    const SceneMotion& motion;
     const SensorModel &sensor, &clean_sensor;
     const ExposureControl& control;
     const OutputSettings& output;

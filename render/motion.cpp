@@ -13,7 +13,7 @@ namespace rugae {
 // The last `kept` entries. Every entry is made once while it is kept; whoever needs one that is
 // being made waits for it.
 template <typename T>
-struct Motion::Cache {
+struct SceneMotion::Cache {
   struct Entry {
     std::mutex mutex;
     std::shared_ptr<const T> value;
@@ -57,7 +57,8 @@ std::vector<Instant> FrameView::instants(int height) const {
   return rows;
 }
 
-Motion::Motion(const Wall& rest, WallMotion motion, CameraPath path, const MotionOptions& options)
+SceneMotion::SceneMotion(const Wall& rest, WallMotion motion, CameraPath path,
+                         const MotionOptions& options)
     : rest_(rest),
       motion_(std::move(motion)),
       path_(std::move(path)),
@@ -74,7 +75,7 @@ Motion::Motion(const Wall& rest, WallMotion motion, CameraPath path, const Motio
         options.frames, options.height, options.fps, options.row_time_s);
 }
 
-Positions Motion::positions(int frame) const {
+Positions SceneMotion::positions(int frame) const {
   const int held = std::clamp(frame, 0, options_.frames - 1);
   return positions_->get(held, [&] {
     const std::vector<Vec3>& rest = rest_.surface().wall().vertices;
@@ -95,7 +96,7 @@ Positions Motion::positions(int frame) const {
   });
 }
 
-std::shared_ptr<const Wall> Motion::wall(int frame) const {
+std::shared_ptr<const Wall> SceneMotion::wall(int frame) const {
   return walls_->get(frame, [&]() -> std::shared_ptr<const Wall> {
     const bool within = options_.row_time_s > 0.0 || options_.moves_within;
     return std::make_shared<const Wall>(rest_, positions(frame),
@@ -104,7 +105,7 @@ std::shared_ptr<const Wall> Motion::wall(int frame) const {
   });
 }
 
-FrameView Motion::view(int frame) const {
+FrameView SceneMotion::view(int frame) const {
   FrameView view;
   view.index = frame;
   view.fps = options_.fps;
@@ -124,7 +125,7 @@ FrameView Motion::view(int frame) const {
   return view;
 }
 
-std::vector<Vec3f> Motion::displacement_mm(int frame) const {
+std::vector<Vec3f> SceneMotion::displacement_mm(int frame) const {
   if (!motion_) return {};
   const Positions now = positions(frame);
   const std::vector<Vec3>& rest = rest_.surface().wall().vertices;

@@ -44,10 +44,10 @@ struct MotionOptions {
 /// The wall's vertices are found at the frames' times, as the wall at rest plus a displacement
 /// rounded to kDisplacementStep_mm, and move on straight lines at constant speed between two
 /// frames. Before the first and after the last frame they stand still, as the camera does.
-class Motion {
+class SceneMotion {
  public:
   /// `rest` must outlive it. `motion` may be empty.
-  Motion(const Wall& rest, WallMotion motion, CameraPath path, const MotionOptions& options);
+  SceneMotion(const Wall& rest, WallMotion motion, CameraPath path, const MotionOptions& options);
 
   FrameView view(int frame) const;
   /// Where the wall's vertices are at a frame's time, less their places at rest; empty when it

@@ -45,7 +45,7 @@ std::array<double, 4> numbers(std::uint64_t seed, std::uint32_t frame, int pixel
 
 struct PathTracer::Work {
   // Of the tile: where paths begin.
-  std::vector<WallPoint> first{kTileSize};
+  std::vector<ShadedPoint> first{kTileSize};
   Lanes<Vec3> sum;
 
   // Of the paths on their way; a lane is a path.
@@ -56,18 +56,18 @@ struct PathTracer::Work {
   Lanes<float> spread_rad;
 
   // Of the places they came to.
-  std::vector<WallPoint> place{kTileSize};
+  std::vector<ShadedPoint> place{kTileSize};
   Lanes<Vec3> point, add;
   Lanes<Eye> from;
   Lanes<std::uint8_t> lit, hidden;
 
   // Sends a path on from a place; false where it ends.
-  bool send(const WallPoint& from_place, const Vec3& from_point, const Vec3& out,
+  bool send(const ShadedPoint& from_place, const Vec3& from_point, const Vec3& out,
             const std::array<double, 4>& u, int lane_of_sender, int samples, const Vec3& so_far,
             int path);
 };
 
-bool PathTracer::Work::send(const WallPoint& here, const Vec3& here_mm, const Vec3& out,
+bool PathTracer::Work::send(const ShadedPoint& here, const Vec3& here_mm, const Vec3& out,
                             const std::array<double, 4>& u, int owner_of_path, int samples,
                             const Vec3& so_far, int path) {
   const ScatterSample s = sample_scatter(here, out, u);
@@ -100,8 +100,8 @@ void PathTracer::trace(std::span<const Emitter> lights, const Wall& wall, const 
   };
   const auto place_of = [&wall](const Tile& t, const SurfaceTile& s, int k) {
     const int lane = s.lane[k];
-    return WallPoint(wall.geometric_normal(t.hit[lane].triangle, t.instant_of(lane).beat),
-                     s.shading_normal[k], s.material[k], t.direction_world[lane]);
+    return ShadedPoint(wall.geometric_normal(t.hit[lane].triangle, t.instant_of(lane).beat),
+                       s.shading_normal[k], s.material[k], t.direction_world[lane]);
   };
   for (int k = 0; k < surface.count; ++k) {
     w.first[static_cast<std::size_t>(k)] = place_of(tile, surface, k);
@@ -137,7 +137,7 @@ void PathTracer::trace(std::span<const Emitter> lights, const Wall& wall, const 
           const int path = w.surface.lane[k];
           const Instant& instant = paths.instant_of(path);
           const PlacedLight placed(light, instant.world_from_camera, instant.camera_mm);
-          const WallPoint& here = w.place[static_cast<std::size_t>(k)];
+          const ShadedPoint& here = w.place[static_cast<std::size_t>(k)];
           const Arriving arriving = placed.at(w.point[k]);
           const Scattered f = scatter(here, arriving.to_light, -paths.direction_world[path]);
           w.add[k] = arriving.irradiance *

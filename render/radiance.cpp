@@ -67,8 +67,8 @@ void add_offset_light(const Emitter& light, const Wall& wall, const Tile& tile,
     const PlacedLight placed(light, instant.world_from_camera, instant.camera_mm);
     from[k] = {placed.position_mm, instant.beat};
     point[k] = tile.eye_of(lane).position_mm + hit.range_mm * direction;
-    const WallPoint here(wall.geometric_normal(hit.triangle, instant.beat),
-                         surface.shading_normal[k], surface.material[k], direction);
+    const ShadedPoint here(wall.geometric_normal(hit.triangle, instant.beat),
+                           surface.shading_normal[k], surface.material[k], direction);
     const Arriving arriving = placed.at(point[k]);
     const Scattered f = scatter(here, arriving.to_light, -direction);
     scattered[k] = {f.wall * arriving.irradiance, f.coat * arriving.irradiance};

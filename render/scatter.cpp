@@ -21,7 +21,7 @@ Mat3 world_from_local(const Vec3& z) {
 
 // The share of samples that go to the wet layer: what it reflects of what comes back in all, kept
 // away from 0 and 1 so that neither layer is ever sampled badly.
-double coat_share(const WallPoint& p, const Vec3& out) {
+double coat_share(const ShadedPoint& p, const Vec3& out) {
   constexpr double kLeast = 0.1, kMost = 0.9;
   if (!(p.coat.coverage > 0.0)) return 0.0;
   const double cosine = std::clamp(out.dot(p.coat_normal), 0.0, 1.0);
@@ -33,8 +33,8 @@ double coat_share(const WallPoint& p, const Vec3& out) {
 }  // namespace
 
 // n_coat = normalize(n - g_tangential), g the slope of the wet layer's height.
-WallPoint::WallPoint(const Vec3& geometric, const Vec3f& shading, const MucosaSample& material,
-                     const Vec3& direction_world)
+ShadedPoint::ShadedPoint(const Vec3& geometric, const Vec3f& shading, const MucosaSample& material,
+                         const Vec3& direction_world)
     : geometric_normal(geometric),
       normal(shading.cast<double>().normalized()),
       coat{material.roughness, material.coverage, material.f0},
@@ -44,7 +44,7 @@ WallPoint::WallPoint(const Vec3& geometric, const Vec3f& shading, const MucosaSa
   coat_normal = (normal - (gradient - normal * normal.dot(gradient))).normalized();
 }
 
-Scattered scatter(const WallPoint& p, const Vec3& in, const Vec3& out) {
+Scattered scatter(const ShadedPoint& p, const Vec3& in, const Vec3& out) {
   const double cos_in = in.dot(p.normal), cos_out = out.dot(p.normal);
   if (!(cos_in > 0.0) || !(cos_out > 0.0) || !(in.dot(p.geometric_normal) > 0.0)) return {};
   Scattered result;
@@ -63,7 +63,7 @@ Scattered scatter(const WallPoint& p, const Vec3& in, const Vec3& out) {
   return result;
 }
 
-double scatter_pdf(const WallPoint& p, const Vec3& in, const Vec3& out) {
+double scatter_pdf(const ShadedPoint& p, const Vec3& in, const Vec3& out) {
   const double share = coat_share(p, out);
   double pdf = (1.0 - share) * std::max(0.0, in.dot(p.normal)) * (1.0 / kPi);
   if (share > 0.0 && out.dot(p.coat_normal) > 0.0) {
@@ -78,7 +78,8 @@ double scatter_pdf(const WallPoint& p, const Vec3& in, const Vec3& out) {
   return pdf;
 }
 
-ScatterSample sample_scatter(const WallPoint& p, const Vec3& out, const std::array<double, 4>& u) {
+ScatterSample sample_scatter(const ShadedPoint& p, const Vec3& out,
+                             const std::array<double, 4>& u) {
   Vec3 direction;
   const double share = coat_share(p, out);
   if (u[0] < share) {

@@ -236,13 +236,13 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
          .keep_materials = options.render.lens.samples > 1 && !scene.board,
          .device = options.ray_device,
          .highlights = light.highlights});
-    const Motion motion(renderer.wall(), scene.motion, path.between,
-                        {.frames = frames,
-                         .fps = camera.sensor.fps,
-                         .height = camera.lens.height,
-                         .row_time_s = row_time_s(options.render, camera, scene),
-                         .moves_within = options.render.lens.motion_blur,
-                         .in_flight = 2 * threads});
+    const SceneMotion motion(renderer.wall(), scene.motion, path.between,
+                             {.frames = frames,
+                              .fps = camera.sensor.fps,
+                              .height = camera.lens.height,
+                              .row_time_s = row_time_s(options.render, camera, scene),
+                              .moves_within = options.render.lens.motion_blur,
+                              .in_flight = 2 * threads});
     const SensorOptions sensing{.chain = options.render.sensor,
                                 .read_noise_factor = trajectory.read_noise_factor,
                                 .seed = mount.noise_seed,

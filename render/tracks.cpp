@@ -19,8 +19,9 @@ Hit as_hit(const TrackPoint& point) { return {point.triangle, 0.0, point.b1, poi
 
 }  // namespace
 
-std::vector<TrackPoint> choose_track_points(const FrameRenderer& renderer, const Motion& motion,
-                                            int frames, int count, std::uint64_t seed) {
+std::vector<TrackPoint> choose_track_points(const FrameRenderer& renderer,
+                                            const SceneMotion& motion, int frames, int count,
+                                            std::uint64_t seed) {
   const RayTable& rays = renderer.rays();
   const int chosen = std::min(kFrames, frames);
   std::vector<TrackPoint> points;

@@ -164,16 +164,16 @@ class FeatureMeasure {
       bool edge = false;
       for (std::size_t a = 1; a < kAround; ++a) {
         const TrueLanding& beside = landings[kAround * k + a];
-        edge = edge || beside.sight == Sight::nowhere ||
+        edge = edge || beside.sight == TrueLanding::Sight::nowhere ||
                !((beside.pixel - pixels[kAround * k + a] - moved).norm() <= options_.edge_px);
       }
       const std::optional<Vec2> truth =
-          landing.sight == Sight::seen ? to_picture(landing.pixel) : std::nullopt;
-      if (landing.sight == Sight::nowhere)
+          landing.sight == TrueLanding::Sight::seen ? to_picture(landing.pixel) : std::nullopt;
+      if (landing.sight == TrueLanding::Sight::nowhere)
         ++result.nowhere;
       else if (edge)
         ++result.edge;
-      else if (landing.sight == Sight::hidden)
+      else if (landing.sight == TrueLanding::Sight::hidden)
         ++result.hidden;
       else if (!truth)
         ++result.outside;

@@ -154,7 +154,7 @@ class Oracle {
     }
     const auto landings = motion_.follow(from, to, begun);
     for (std::size_t i = 0; i < observations.size(); ++i) {
-      if (landings[i].sight != Sight::seen) continue;
+      if (landings[i].sight != TrueLanding::Sight::seen) continue;
       const auto pixel = grids.preprocessed(landings[i].pixel);
       observations[i]->inlier = pixel.has_value();
       if (pixel) observations[i]->pixel = *pixel;
@@ -180,8 +180,9 @@ class Oracle {
     std::vector<Vec3> seen;
     std::vector<Vec2> rays;
     for (std::size_t i = 0; i < here.size(); ++i) {
-      const auto pixel =
-          here[i].sight == Sight::seen ? grids.preprocessed(here[i].pixel) : std::nullopt;
+      const auto pixel = here[i].sight == TrueLanding::Sight::seen
+                             ? grids.preprocessed(here[i].pixel)
+                             : std::nullopt;
       const auto ray = pixel ? ray_of(projector, *pixel) : std::nullopt;
       if (!ray) continue;
       seen.push_back(points[i]);

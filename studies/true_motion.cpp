@@ -132,9 +132,9 @@ std::vector<TrueLanding> TrueMotion::follow(int from, int to, std::span<const Ve
     };
     const std::optional<Vec2> landing = then.landing(lens_, at, pixels[i].y());
     if (!landing) continue;
-    landings[i] = {Sight::outside, *landing};
+    landings[i] = {TrueLanding::Sight::outside, *landing};
     if (!lens_.contains(*landing)) continue;
-    landings[i].sight = Sight::hidden;
+    landings[i].sight = TrueLanding::Sight::hidden;
     const double offset_s = then.offset_s(landing->y()), beat = fps * offset_s;
     looks[i] = {then.at(landing->y()).translation, beat};
     places[i] = at(offset_s);
@@ -146,7 +146,7 @@ std::vector<TrueLanding> TrueMotion::follow(int from, int to, std::span<const Ve
   }
   if (n > 0) wall_then->raycaster->hidden_from(looks, places, faces, hidden, RayOrder::scattered);
   for (std::size_t i = 0; i < n; ++i)
-    if (faces[i] && !hidden[i]) landings[i].sight = Sight::seen;
+    if (faces[i] && !hidden[i]) landings[i].sight = TrueLanding::Sight::seen;
   return landings;
 }
 

@@ -14,14 +14,13 @@
 
 namespace rugae {
 
-enum class Sight {
-  seen,     // the wall point is in the other frame
-  hidden,   // ... in its image, but turned away or behind other wall
-  outside,  // ... beyond its image or field stop
-  nowhere,  // the pixel meets no wall, or the other lens has no place for the point
-};
-
 struct TrueLanding {
+  enum class Sight {
+    seen,     // the wall point is in the other frame
+    hidden,   // ... in its image, but turned away or behind other wall
+    outside,  // ... beyond its image or field stop
+    nowhere,  // the pixel meets no wall, or the other lens has no place for the point
+  };
   Sight sight = Sight::nowhere;
   Vec2 pixel = Vec2::Zero();  // unless nowhere
 };

@@ -14,6 +14,7 @@
 
 #include "core/files.h"
 #include "core/random.h"
+#include "tests/apps/child.h"
 
 namespace rugae {
 namespace {
@@ -46,23 +47,9 @@ class StudyKilled : public ::testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   pid_t start(const std::string& out, const std::vector<std::string>& more = {}) const {
-    const pid_t child = fork();
-    if (child != 0) return child;
-    std::vector<std::string> words = {RUGAE_PROGRAM, "run", "study.yaml", "--out", out};
+    std::vector<std::string> words = {"run", "study.yaml", "--out", out};
     words.insert(words.end(), more.begin(), more.end());
-    std::vector<char*> arguments;
-    for (std::string& word : words) arguments.push_back(word.data());
-    arguments.push_back(nullptr);
-    const bool ready = chdir(folder_.c_str()) == 0 && freopen("/dev/null", "w", stderr) &&
-                       freopen("/dev/null", "w", stdout);
-    if (ready) execv(arguments[0], arguments.data());
-    _exit(127);
-  }
-
-  static int wait_for(pid_t child) {
-    int status = 0;
-    waitpid(child, &status, 0);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return start_program(folder_, words);
   }
 
   fs::path folder_ = fs::temp_directory_path() / ("rugae_killed_" + std::to_string(getpid()));

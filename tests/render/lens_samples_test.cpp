@@ -126,13 +126,13 @@ TEST(LensSamples, ATurningCameraSmearsTheBentEdge) {
   const double row_time_s = 0.9 / (kFps * 72);
   const FrameRenderer renderer(Surface(scene.wall, scene.bright), scene.camera,
                                {.vignetting = false, .labels = LabelSet::none()});
-  const Motion motion(renderer.wall(), {},
-                      [](double frame) {
-                        const double turned_rad = kTurn_rad_s * (frame - 1.0) / kFps;
-                        return Rigid3(Quat(Eigen::AngleAxisd(turned_rad, Vec3::UnitY())),
-                                      Vec3::Zero());
-                      },
-                      {.frames = 3, .fps = kFps, .height = 72, .row_time_s = row_time_s});
+  const SceneMotion motion(renderer.wall(), {},
+                           [](double frame) {
+                             const double turned_rad = kTurn_rad_s * (frame - 1.0) / kFps;
+                             return Rigid3(Quat(Eigen::AngleAxisd(turned_rad, Vec3::UnitY())),
+                                           Vec3::Zero());
+                           },
+                           {.frames = 3, .fps = kFps, .height = 72, .row_time_s = row_time_s});
   const cv::Mat share = scene.share(motion.view(1), {.samples = 256, .exposure_s = kExposure_s});
   const auto edge_px = [&](double t) {
     return scene.camera.lens.cx - scene.camera.lens.fx * std::tan(kTurn_rad_s * t);
@@ -165,11 +165,12 @@ TEST(LensSamples, ALongExposureIsTheMeanOfShortOnes) {
     v = world.rest.vertices;
     for (Vec3& p : v) p *= 1.0 + 0.03 * (frame - 1.0) * std::sin(0.1 * p.x());
   };
-  const Motion whole(renderer.wall(), [&](double t, std::vector<Vec3>& v) { wall_at(t * kFps, v); },
-                     pose, {.frames = 3, .fps = kFps, .height = 48, .moves_within = true});
+  const SceneMotion whole(renderer.wall(),
+                          [&](double t, std::vector<Vec3>& v) { wall_at(t * kFps, v); }, pose,
+                          {.frames = 3, .fps = kFps, .height = 48, .moves_within = true});
   // The fine frame i is the instant (i + 1/2) / 64 of the coarse ones.
   const double fine_fps = kFps * kFiner;
-  const Motion fine(
+  const SceneMotion fine(
       renderer.wall(),
       [&](double t, std::vector<Vec3>& v) { wall_at((t * fine_fps + 0.5) / kFiner, v); },
       [&](double frame) { return pose((frame + 0.5) / kFiner); },
@@ -199,7 +200,7 @@ TEST(LensSamples, ALongExposureIsTheMeanOfShortOnes) {
 TEST(LensSamples, OneAndTwoThreadsGatherTheSame) {
   const test::MovingWorld world(64, 48, 3, 0.8);
   const FrameRenderer renderer = world.renderer({});
-  const Motion motion = world.motion(renderer);
+  const SceneMotion motion = world.motion(renderer);
   const auto gather = [&](int threads) {
     tbb::task_arena arena(threads);
     return arena.execute([&] {

@@ -27,12 +27,12 @@ class Sequence {
     if (index + 1 < world_.frames) next = motion_.view(index + 1);
     return renderer_.render(now, previous ? &*previous : nullptr, next ? &*next : nullptr);
   }
-  const Motion& motion() const { return motion_; }
+  const SceneMotion& motion() const { return motion_; }
 
  private:
   const MovingWorld& world_;
   FrameRenderer renderer_;
-  Motion motion_;
+  SceneMotion motion_;
 };
 
 // Depth, triangle and barycentric coordinates say where the pixel's own point is: it projects to
@@ -213,11 +213,11 @@ TEST(MovingWall, AWallThatDoesNotMoveIsAStillOne) {
                               .fps = MovingWorld::kFps,
                               .height = 48,
                               .row_time_s = world.row_time_s()};
-  const Motion still(renderer.wall(), {}, path, options);
-  const Motion moving(
+  const SceneMotion still(renderer.wall(), {}, path, options);
+  const SceneMotion moving(
       renderer.wall(), [&](double, std::vector<Vec3>& v) { v = world.rest.vertices; }, path,
       options);
-  const auto render = [&](const Motion& motion) {
+  const auto render = [&](const SceneMotion& motion) {
     const FrameView now = motion.view(4), next = motion.view(5);
     return renderer.render(now, nullptr, &next).truth;
   };
@@ -234,7 +234,7 @@ TEST(MovingWall, AWallThatDoesNotMoveIsAStillOne) {
 TEST(MovingWall, DisplacementsAreExactAndHoldAtTheEnds) {
   const MovingWorld world(16, 12, 2, 0.5);
   const FrameRenderer renderer = world.renderer({});
-  const Motion motion = world.motion(renderer);
+  const SceneMotion motion = world.motion(renderer);
   const Hit corner{0, 1.0, 0.0f, 0.0f};  // the first corner of the first triangle
   const auto vertex = static_cast<std::size_t>(world.rest.triangles[0][0]);
   for (const int frame : {0, 3, world.frames - 1}) {
@@ -242,7 +242,7 @@ TEST(MovingWall, DisplacementsAreExactAndHoldAtTheEnds) {
     const Vec3 exact =
         world.rest.vertices[vertex] + motion.displacement_mm(frame)[vertex].cast<double>();
     EXPECT_EQ(wall->point(corner, 0.0), exact);
-    EXPECT_TRUE((exact - world.wall_at(frame)[vertex]).norm() <= Motion::kDisplacementStep_mm);
+    EXPECT_TRUE((exact - world.wall_at(frame)[vertex]).norm() <= SceneMotion::kDisplacementStep_mm);
   }
   const auto first = motion.view(0).wall, last = motion.view(world.frames - 1).wall;
   EXPECT_EQ(first->point(corner, -0.4), first->point(corner, 0.0));
@@ -264,7 +264,7 @@ TEST(RollingShutter, AVerticalEdgeBendsAsComputed) {
   const TriangleMesh wall = test::plane_mesh(20.0, 400.0, 2);
   const FrameRenderer renderer(Surface(wall, edge), camera,
                                {.vignetting = false, .labels = LabelSet::none()});
-  const Motion motion(
+  const SceneMotion motion(
       renderer.wall(), {},
       [](double frame) {
         return Rigid3(Quat(Eigen::AngleAxisd(kTurn_rad_per_frame * (frame - 1.0), Vec3::UnitY())),

@@ -68,7 +68,7 @@ struct MovingWorld {
   FrameRenderer renderer(const LabelSet& labels) const {
     return {Surface(rest, constant_material(lambert(0.5f))), camera, {.labels = labels}};
   }
-  Motion motion(const FrameRenderer& renderer) const {
+  SceneMotion motion(const FrameRenderer& renderer) const {
     return {
         renderer.wall(),
         [this](double time_s, std::vector<Vec3>& vertices) { move_wall(time_s, vertices); },

@@ -12,8 +12,8 @@ std::array<double, 4> numbers(std::uint64_t draw) {
   return random_uniform(3, Purpose::test, 11, draw);
 }
 
-WallPoint wall_point(double roughness, double coverage, double f0, const Vec3f& gradient,
-                     float albedo = 0.5f) {
+ShadedPoint wall_point(double roughness, double coverage, double f0, const Vec3f& gradient,
+                       float albedo = 0.5f) {
   MucosaSample sample;
   sample.albedo = Vec3f::Constant(albedo);
   sample.roughness = static_cast<float>(roughness);
@@ -25,7 +25,7 @@ WallPoint wall_point(double roughness, double coverage, double f0, const Vec3f& 
 }
 
 // A direction `angle_rad` off the point's normal.
-Vec3 tilted(const WallPoint& p, double angle_rad, double azimuth_rad) {
+Vec3 tilted(const ShadedPoint& p, double angle_rad, double azimuth_rad) {
   const Vec3 a = p.normal.unitOrthogonal(), b = p.normal.cross(a);
   return std::cos(angle_rad) * p.normal +
          std::sin(angle_rad) * (std::cos(azimuth_rad) * a + std::sin(azimuth_rad) * b);
@@ -44,7 +44,7 @@ const Case kCases[] = {{0.3, 0.0, 0.02, Vec3f::Zero(), 0.6},
 
 // The sphere around the normal in bands of equal solid angle.
 constexpr int kBands = 24, kSectors = 24, kCells = kBands * kSectors;
-int cell_of(const WallPoint& p, const Vec3& w) {
+int cell_of(const ShadedPoint& p, const Vec3& w) {
   const Vec3 a = p.normal.unitOrthogonal(), b = p.normal.cross(a);
   const int band = std::min(kBands - 1, static_cast<int>(0.5 * (w.dot(p.normal) + 1.0) * kBands));
   const double turn = std::atan2(w.dot(b), w.dot(a)) / (2.0 * kPi) + 0.5;
@@ -52,7 +52,7 @@ int cell_of(const WallPoint& p, const Vec3& w) {
 }
 
 // The density over a cell, by the midpoint rule.
-std::vector<double> density_by_cell(const WallPoint& p, const Vec3& out, int fine) {
+std::vector<double> density_by_cell(const ShadedPoint& p, const Vec3& out, int fine) {
   std::vector<double> mass(kCells, 0.0);
   const Vec3 a = p.normal.unitOrthogonal(), b = p.normal.cross(a);
   const double solid_angle = 4.0 * kPi / (kCells * fine * fine);
@@ -70,7 +70,7 @@ std::vector<double> density_by_cell(const WallPoint& p, const Vec3& out, int fin
 
 TEST(Scatter, TheDensityIntegratesToOne) {
   for (const Case& c : kCases) {
-    const WallPoint p = wall_point(c.roughness, c.coverage, c.f0, c.gradient);
+    const ShadedPoint p = wall_point(c.roughness, c.coverage, c.f0, c.gradient);
     double sum = 0.0;
     for (double mass : density_by_cell(p, tilted(p, c.angle_rad, 0.4), 40)) sum += mass;
     // The midpoint rule over 960 x 960 directions; the kink at the horizon costs the most.
@@ -83,7 +83,7 @@ TEST(Scatter, TheDensityIntegratesToOne) {
 TEST(Scatter, TheSamplerFollowsItsDensity) {
   constexpr int kDraws = 200000;
   for (const Case& c : kCases) {
-    const WallPoint p = wall_point(c.roughness, c.coverage, c.f0, c.gradient);
+    const ShadedPoint p = wall_point(c.roughness, c.coverage, c.f0, c.gradient);
     const Vec3 out = tilted(p, c.angle_rad, 0.4);
     std::vector<int> counts(kCells, 0);
     int below = 0;
@@ -131,7 +131,7 @@ TEST(Scatter, TheFurnaceByItsSamples) {
     for (double f0 : {0.02, 0.3, 1.0})
       for (double coverage : {0.0, 0.5, 1.0})
         for (double angle : {0.1, 0.8, 1.4}) {
-          const WallPoint p = wall_point(roughness, coverage, f0, Vec3f::Zero(), 1.0f);
+          const ShadedPoint p = wall_point(roughness, coverage, f0, Vec3f::Zero(), 1.0f);
           const Vec3 out = tilted(p, angle, 2.0);
           double sum = 0.0, sum2 = 0.0;
           for (int i = 0; i < kDraws; ++i) {
@@ -155,7 +155,7 @@ TEST(Scatter, TheFurnaceByItsSamples) {
 
 // scatter is the model of bsdf.h where both layers have one normal.
 TEST(Scatter, IsTheReflectionModel) {
-  const WallPoint p = wall_point(0.3, 0.6, 0.1, Vec3f::Zero(), 0.4f);
+  const ShadedPoint p = wall_point(0.3, 0.6, 0.1, Vec3f::Zero(), 0.4f);
   const Vec3 a = p.normal.unitOrthogonal(), b = p.normal.cross(a);
   const auto local = [&](const Vec3& w) { return Vec3(w.dot(a), w.dot(b), w.dot(p.normal)); };
   for (std::uint64_t i = 0; i < 200; ++i) {

@@ -15,7 +15,7 @@ using test::MovingWorld;
 TEST(Tracks, PointsLandWhereTheyGoAndAreSeenWhereTheyAre) {
   const MovingWorld world(48, 36, 3, 0.9, 3.0);
   const FrameRenderer renderer = world.renderer({});
-  const Motion motion = world.motion(renderer);
+  const SceneMotion motion = world.motion(renderer);
   constexpr int kPoints = 400;
   const auto points = choose_track_points(renderer, motion, world.frames, kPoints, 7);
   ASSERT_EQ(points.size(), static_cast<std::size_t>(kPoints));
@@ -60,7 +60,7 @@ TEST(Tracks, PointsLandWhereTheyGoAndAreSeenWhereTheyAre) {
 TEST(Tracks, AreDrawnBySeedOverTheSequence) {
   const MovingWorld world(32, 24, 3, 0.0);
   const FrameRenderer renderer = world.renderer({});
-  const Motion motion = world.motion(renderer);
+  const SceneMotion motion = world.motion(renderer);
   const auto one = choose_track_points(renderer, motion, world.frames, 64, 1),
              again = choose_track_points(renderer, motion, world.frames, 64, 1),
              other = choose_track_points(renderer, motion, world.frames, 64, 2);

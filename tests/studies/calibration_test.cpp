@@ -16,7 +16,7 @@
 #include "recon/chessboard.h"
 #include "render/simulate.h"
 #include "tests/message_of.h"
-#include "tests/studies/temporary_folder.h"
+#include "tests/studies/in_temporary_folder.h"
 
 namespace rugae {
 namespace {
@@ -25,10 +25,10 @@ namespace fs = std::filesystem;
 constexpr int kColumns = 6, kRows = 5;
 constexpr double kSquare_mm = 3.0;
 
-class Calibration : public TemporaryFolder {
+class Calibration : public InTemporaryFolder {
  protected:
   void SetUp() override {
-    TemporaryFolder::SetUp();
+    InTemporaryFolder::SetUp();
     write_camera("small", "model: brown_conrady, k1: -0.2, k2: 0.03, p1: 0.0008, p2: -0.0006");
     write_atomic(folder_ / "board.yaml",
                  fmt::format("like: chessboard\nboard: {{columns: {}, rows: {}, square_mm: {}}}\n",

@@ -2,8 +2,8 @@
 
 #include "core/files.h"
 #include "dataset/layout.h"
+#include "tests/studies/in_temporary_folder.h"
 #include "tests/studies/small_set.h"
-#include "tests/studies/temporary_folder.h"
 
 namespace rugae {
 namespace {
@@ -11,10 +11,10 @@ namespace {
 namespace fs = std::filesystem;
 
 // Cells whose parts are files with a word in them; datasets are whole.
-class Discard : public TemporaryFolder {
+class Discard : public InTemporaryFolder {
  protected:
   void SetUp() override {
-    TemporaryFolder::SetUp();
+    InTemporaryFolder::SetUp();
     results_.keep = Keep::results;
   }
 

@@ -6,8 +6,8 @@
 
 #include "core/check.h"
 #include "core/files.h"
+#include "tests/studies/in_temporary_folder.h"
 #include "tests/studies/inside_sphere.h"
-#include "tests/studies/temporary_folder.h"
 #include "validate/wall_seen.h"
 
 namespace rugae {
@@ -20,7 +20,7 @@ constexpr double kStored_mm = 1e-3;
 // The facets lie inside the sphere: 41 mm (1 - cos(pi / (40 sqrt 2))).
 constexpr double kFacets_mm = 0.07;
 
-class Evaluate : public TemporaryFolder {
+class Evaluate : public InTemporaryFolder {
  protected:
   json metrics(double units_per_mm, double radius_mm = inside_sphere::kRadius_mm) {
     inside_sphere::write_dataset(folder_ / "data");

@@ -14,7 +14,7 @@
 #include "dataset/layout.h"
 #include "render/simulate.h"
 #include "studies/study.h"
-#include "tests/studies/temporary_folder.h"
+#include "tests/studies/in_temporary_folder.h"
 
 namespace rugae {
 namespace {
@@ -24,10 +24,10 @@ using nlohmann::json;
 
 constexpr int kFrames = 6;
 
-class External : public TemporaryFolder {
+class External : public InTemporaryFolder {
  protected:
   void SetUp() override {
-    TemporaryFolder::SetUp();
+    InTemporaryFolder::SetUp();
     write_atomic(folder_ / "small.yaml",
                  "name: small\nframes_in_paper: 0\ndiameter_mm: 5\n"
                  "lens: {model: brown_conrady, width: 80, height: 60, horizontal_fov_deg: 90}\n"

@@ -14,7 +14,7 @@
 #include "recon/frame_follower.h"
 #include "recon/pipeline.h"
 #include "render/simulate.h"
-#include "tests/studies/temporary_folder.h"
+#include "tests/studies/in_temporary_folder.h"
 #include "validate/evaluate.h"
 
 namespace rugae {
@@ -26,7 +26,7 @@ using nlohmann::json;
 constexpr double kPath_mm = 24.0;
 constexpr int kFrames = 18;
 
-class FieldStopLoop : public TemporaryFolder {
+class FieldStopLoop : public InTemporaryFolder {
  protected:
   void simulate_through(const std::string& stop) {
     write_atomic(folder_ / "camera.yaml",

@@ -6,7 +6,7 @@
 
 #include "core/check.h"
 #include "studies/measure.h"
-#include "tests/studies/temporary_folder.h"
+#include "tests/studies/in_temporary_folder.h"
 #include "tests/studies/two_planes.h"
 
 namespace rugae {
@@ -25,7 +25,7 @@ FeatureMeasureOptions by_step(int step) {
   return options;
 }
 
-class MeasureFeatures : public TemporaryFolder {
+class MeasureFeatures : public InTemporaryFolder {
  protected:
   json measure(const Matcher& matcher, const FeatureMeasureOptions& options = {},
                const std::string& folder = "data") {

@@ -11,8 +11,8 @@
 #include "recon/preprocess/reflections.h"
 #include "render/simulate.h"
 #include "studies/measure.h"
+#include "tests/studies/in_temporary_folder.h"
 #include "tests/studies/small_set.h"
-#include "tests/studies/temporary_folder.h"
 
 namespace rugae {
 namespace {
@@ -43,7 +43,7 @@ ReflectionMeasureOptions by(const std::vector<double>& shares) {
   return options;
 }
 
-class MeasureReflections : public TemporaryFolder {
+class MeasureReflections : public InTemporaryFolder {
  protected:
   json measure(const ReflectionMeasureOptions& options = {}) {
     return measure_reflections(folder_ / "data", options, progress_).at("reflections");

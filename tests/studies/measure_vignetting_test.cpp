@@ -9,8 +9,8 @@
 #include "studies/measure.h"
 #include "studies/tone_curve.h"
 #include "tests/recon/synthetic_texture.h"
+#include "tests/studies/in_temporary_folder.h"
 #include "tests/studies/small_set.h"
-#include "tests/studies/temporary_folder.h"
 
 namespace rugae {
 namespace {
@@ -28,7 +28,7 @@ constexpr double kLeft = 0.1, kLeftOfLight = 0.2;
 const char* const kTones[] = {"srgb", "gamma22", "linear"};
 ToneCurve curve(int tone) { return ToneCurve(static_cast<Tone>(tone)); }
 
-class MeasureVignetting : public TemporaryFolder {
+class MeasureVignetting : public InTemporaryFolder {
  protected:
   // A textured plane before the camera and, so that radial gradients are symmetric, its reciprocal,
   // seen through the camera's lens, in the light of its lights or an even one.

@@ -13,7 +13,7 @@
 #include "render/simulate.h"
 #include "studies/true_motion.h"
 #include "studies/variant.h"
-#include "tests/studies/temporary_folder.h"
+#include "tests/studies/in_temporary_folder.h"
 #include "validate/evaluate.h"
 
 namespace rugae {

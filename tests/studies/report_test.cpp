@@ -11,15 +11,15 @@
 #include "studies/plots.h"
 #include "studies/tables.h"
 #include "tests/studies/from_base64.h"
+#include "tests/studies/in_temporary_folder.h"
 #include "tests/studies/inside_sphere.h"
 #include "tests/studies/page_without_viewer.h"
-#include "tests/studies/temporary_folder.h"
 #include "validate/evaluate.h"
 
 namespace rugae {
 namespace {
 
-class Report : public TemporaryFolder {
+class Report : public InTemporaryFolder {
  protected:
   std::string page() {
     inside_sphere::write_dataset(folder_ / "data");

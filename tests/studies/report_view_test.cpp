@@ -7,8 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/studies/from_base64.h"
+#include "tests/studies/in_temporary_folder.h"
 #include "tests/studies/inside_sphere.h"
-#include "tests/studies/temporary_folder.h"
 #include "validate/evaluate.h"
 #include "validate/surface_error.h"
 
@@ -48,10 +48,10 @@ std::vector<Vec3> points_of(const json& mesh) {
 }
 
 // A camera inside a sphere, and an estimate of it that is true but for a map 1 mm too large.
-class ReportView : public TemporaryFolder {
+class ReportView : public InTemporaryFolder {
  protected:
   void SetUp() override {
-    TemporaryFolder::SetUp();
+    InTemporaryFolder::SetUp();
     cell_.cell = {"test", "1", "paper"};
     cell_.dataset = folder_ / "data";
     cell_.estimate = folder_ / "estimate";

@@ -13,7 +13,7 @@
 
 #include "core/check.h"
 #include "core/files.h"
-#include "tests/studies/temporary_folder.h"
+#include "tests/studies/in_temporary_folder.h"
 
 namespace rugae {
 namespace {
@@ -23,10 +23,10 @@ namespace fs = std::filesystem;
 constexpr int kJobs = 2;
 constexpr double kMuchGb = 100.0;
 
-class RunCells : public TemporaryFolder {
+class RunCells : public InTemporaryFolder {
  protected:
   void SetUp() override {
-    TemporaryFolder::SetUp();
+    InTemporaryFolder::SetUp();
     alone_.alone = true;
     // Time for another cell to start, if one will.
     script("for i in 1 2 3 4 5 6 7 8 9 10; do [ $(grep -c start " + (folder_ / "said").string() +

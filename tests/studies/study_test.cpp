@@ -4,8 +4,8 @@
 
 #include "core/check.h"
 #include "core/files.h"
+#include "tests/studies/in_temporary_folder.h"
 #include "tests/studies/page_without_viewer.h"
-#include "tests/studies/temporary_folder.h"
 
 namespace rugae {
 namespace {
@@ -14,10 +14,10 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 // A small camera on a short path: the whole loop in seconds.
-class RunStudy : public TemporaryFolder {
+class RunStudy : public InTemporaryFolder {
  protected:
   void SetUp() override {
-    TemporaryFolder::SetUp();
+    InTemporaryFolder::SetUp();
     write_atomic(folder_ / "small.yaml",
                  "name: small\nframes_in_paper: 0\ndiameter_mm: 5\n"
                  "lens: {model: brown_conrady, width: 160, height: 120, horizontal_fov_deg: 90}\n"

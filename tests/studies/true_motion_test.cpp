@@ -10,7 +10,7 @@
 #include "core/check.h"
 #include "core/files.h"
 #include "render/simulate.h"
-#include "tests/studies/temporary_folder.h"
+#include "tests/studies/in_temporary_folder.h"
 
 namespace rugae {
 namespace {
@@ -21,7 +21,7 @@ constexpr double kLabels_px = 1e-4, kTracks_px = 1e-3;
 // Nearer to the picture's border a landing may fall to either side.
 constexpr double kBorder_px = 1e-3;
 
-class TrueMotionTest : public TemporaryFolder {
+class TrueMotionTest : public InTemporaryFolder {
  protected:
   void simulate_with(const std::string& scene, const std::string& shutter) {
     write_atomic(
@@ -59,29 +59,31 @@ class TrueMotionTest : public TemporaryFolder {
     std::vector<Vec2> pixels;
     for (int y = 0; y < kHeight; ++y)
       for (int x = 0; x < kWidth; ++x) pixels.emplace_back(x + 0.5, y + 0.5);
-    std::map<Sight, int> counts;
+    std::map<TrueLanding::Sight, int> counts;
     for (int i = 0; i + 1 < kFrames; ++i) {
       const cv::Mat flow = motion.truth().flow_px(i), masks = motion.truth().masks(i);
       const std::vector<TrueLanding> found = motion.follow(i, i + 1, pixels);
       for (std::size_t k = 0; k < pixels.size(); ++k) {
         const unsigned char bits = masks.ptr<unsigned char>()[k];
-        const Sight said = !(bits & kMaskValid)       ? Sight::nowhere
-                           : !(bits & kMaskFlowValid) ? Sight::outside
-                           : bits & kMaskFlowOccluded ? Sight::hidden
-                                                      : Sight::seen;
+        const auto said = !(bits & kMaskValid)       ? TrueLanding::Sight::nowhere
+                          : !(bits & kMaskFlowValid) ? TrueLanding::Sight::outside
+                          : bits & kMaskFlowOccluded ? TrueLanding::Sight::hidden
+                                                     : TrueLanding::Sight::seen;
         ++counts[said];
-        if (found[k].sight != Sight::nowhere && near_border(found[k].pixel)) continue;
+        if (found[k].sight != TrueLanding::Sight::nowhere && near_border(found[k].pixel)) continue;
         // The labels do not tell beyond the picture from beyond what the lens can see.
-        if (said == Sight::outside && found[k].sight == Sight::nowhere) continue;
+        if (said == TrueLanding::Sight::outside && found[k].sight == TrueLanding::Sight::nowhere)
+          continue;
         ASSERT_EQ(static_cast<int>(found[k].sight), static_cast<int>(said)) << i << ": " << k;
         if (!(bits & kMaskFlowValid)) continue;
         const auto f = flow.ptr<cv::Vec2f>()[k];
         ASSERT_TRUE((pixels[k] + Vec2(f[0], f[1]) - found[k].pixel).norm() <= kLabels_px);
       }
     }
-    EXPECT_TRUE(counts[Sight::seen] > 10000 && counts[Sight::hidden] > 5 &&
-                counts[Sight::outside] > 100)
-        << counts[Sight::seen] << " " << counts[Sight::hidden] << " " << counts[Sight::outside];
+    EXPECT_TRUE(counts[TrueLanding::Sight::seen] > 10000 &&
+                counts[TrueLanding::Sight::hidden] > 5 && counts[TrueLanding::Sight::outside] > 100)
+        << counts[TrueLanding::Sight::seen] << " " << counts[TrueLanding::Sight::hidden] << " "
+        << counts[TrueLanding::Sight::outside];
   }
 
   // Tracks lie between the pixels. Those that are hidden in the first frame are not what it sees.
@@ -110,7 +112,8 @@ class TrueMotionTest : public TemporaryFolder {
       ASSERT_TRUE((found[k].pixel - t->second.pixel).norm() <= kTracks_px)
           << i << " " << points[k] << ": " << found[k].pixel.transpose() << ", expected "
           << t->second.pixel.transpose();
-      ASSERT_EQ(found[k].sight == Sight::seen, t->second.visible) << i << " " << points[k];
+      ASSERT_EQ(found[k].sight == TrueLanding::Sight::seen, t->second.visible)
+          << i << " " << points[k];
       ++(t->second.visible ? seen : hidden);
     }
   }
@@ -124,8 +127,8 @@ TEST_F(TrueMotionTest, IsThatOfLabelsAndTracks) {
   const TrueMotion motion(folder_ / "data");
   const std::vector<Vec2> pixels{{1e6, -1e6}, {40.2, 30.7}};
   const std::vector<TrueLanding> found = motion.follow(2, 2, pixels);
-  EXPECT_EQ(found[0].sight, Sight::nowhere);  // beyond the lens
-  EXPECT_EQ(found[1].sight, Sight::seen);
+  EXPECT_EQ(found[0].sight, TrueLanding::Sight::nowhere);  // beyond the lens
+  EXPECT_EQ(found[1].sight, TrueLanding::Sight::seen);
   EXPECT_TRUE((found[1].pixel - pixels[1]).norm() <= 1e-9);  // to the same frame: stays
   EXPECT_THROW(motion.follow(0, kFrames, pixels), Error);
   EXPECT_THROW(motion.follow(-1, 0, pixels), Error);

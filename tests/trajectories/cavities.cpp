@@ -81,8 +81,8 @@ double view_distance_mm(const ClosestPoint& wall, const Rigid3& world_from_camer
   return t;
 }
 
-Motion motion_of(const PoseTrack& track) {
-  Motion motion;
+PathMotion motion_of(const PoseTrack& track) {
+  PathMotion motion;
   for (std::size_t i = 1; i < track.size(); ++i) {
     const Rigid3 &a = track[i - 1].world_from_camera, &b = track[i].world_from_camera;
     const double mm = (b.translation - a.translation).norm();

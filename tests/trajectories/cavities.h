@@ -24,11 +24,11 @@ TriangleMesh test_tube();
 /// allows.
 double view_distance_mm(const ClosestPoint& wall, const Rigid3& world_from_camera);
 
-struct Motion {
+struct PathMotion {
   double mean_mm = 0.0, max_mm = 0.0;    // between neighbouring poses
   double mean_deg = 0.0, max_deg = 0.0;  // turn between them
 };
-Motion motion_of(const PoseTrack& track);
+PathMotion motion_of(const PoseTrack& track);
 
 /// Pairs of poses more than `apart_mm` of way from each other that are closer than `near_mm` and
 /// look within `similar_deg` of each other.

@@ -70,7 +70,7 @@ std::map<std::string, PoseTrack> check_all(const TriangleMesh& wall, std::uint64
 
 /// Trajectory 1 is the calmest, 4 the wildest; 2, 3 and 6 come back to where they were.
 void check_styles(const std::map<std::string, PoseTrack>& tracks) {
-  std::map<std::string, Motion> motion;
+  std::map<std::string, PathMotion> motion;
   for (const auto& [name, track] : tracks) motion[name] = motion_of(track);
   EXPECT_LE(motion["1"].max_mm, 1.2 * motion["1"].mean_mm);  // steady
   EXPECT_LE(motion["1"].mean_deg, 1.5);

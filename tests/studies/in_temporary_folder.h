@@ -9,7 +9,7 @@
 
 namespace rugae {
 
-class TemporaryFolder : public ::testing::Test {
+class InTemporaryFolder : public ::testing::Test {
  protected:
   void SetUp() override {
     const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
