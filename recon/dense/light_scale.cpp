@@ -24,6 +24,12 @@ constexpr double kStepShare = 1e-4;
 constexpr std::size_t kFewest = 500;  // sights that say anything
 constexpr int kShared = 6;            // columns besides q's: powers of r^2, off centre, wet layer
 
+/// What the answer is tried under.
+struct Belief {
+  double normal_sigma_factor = 1.0;
+  bool uneven = false;  // the picture's light may have a slope
+};
+
 /// Normal equations in the columns gains, fall-off, q.
 struct Sums {
   Eigen::MatrixXd h;
@@ -44,9 +50,11 @@ class Fit {
   };
 
  public:
-  Fit(const std::vector<LightSight>& sights, const std::vector<Emitter>& lights, double factor)
+  Fit(const std::vector<LightSight>& sights, const std::vector<Emitter>& lights,
+      const Belief& belief)
       : sights_(sights),
         lights_(lights),
+        uneven_(belief.uneven),
         shared_(sights.size()),
         own_(sights.size()),
         left_(sights.size(), 0.0),
@@ -60,9 +68,10 @@ class Fit {
       if (i - begin >= 2) {
         std::fill_n(track_of_.begin() + static_cast<std::ptrdiff_t>(begin), i - begin,
                     tracks_.size());
-        tracks_.push_back(
-            {begin, i, factor * std::hypot(kLeastNormalSigmaRad, sights[begin].normal_sigma_rad),
-             first});
+        tracks_.push_back({begin, i,
+                           belief.normal_sigma_factor *
+                               std::hypot(kLeastNormalSigmaRad, sights[begin].normal_sigma_rad),
+                           first});
       }
       begin = i;
     }
@@ -98,7 +107,7 @@ class Fit {
       if (weight_[i] == 0.0) weight_[i] = 1.0;
       const double r2 = sight.off_axis.squaredNorm();
       const double out = -sight.normal_cam.dot(sight.p_cam.normalized());
-      shared_[i] << r2, r2 * r2, r2 * r2 * r2, sight.off_axis,
+      shared_[i] << r2, r2 * r2, r2 * r2 * r2, uneven_ ? sight.off_axis : Vec2(Vec2::Zero()),
           std::pow(1.0 - in, 5) + std::pow(1.0 - out, 5),
           (ahead->ln - behind->ln) / (2.0 * kStepShare);
       own_[i] = {1.0, at->per_normal.dot(sight.tangent_x_cam),
@@ -187,6 +196,7 @@ class Fit {
 
   const std::vector<LightSight>& sights_;
   const std::vector<Emitter>& lights_;
+  bool uneven_ = false;
   int gains_ = 0;
   std::vector<Track> tracks_;
   std::vector<Shared> shared_;
@@ -197,15 +207,14 @@ class Fit {
   double spread_ = kFirstSpread;
 };
 
-// Gains are known up to a common factor: their mean is 0, and so is a gain of which nothing is
-// known.
+// Gains are known up to a common factor: their mean is 0, and so is all of which nothing is known.
 std::optional<Eigen::VectorXd> solve(const Eigen::MatrixXd& h, const Eigen::VectorXd& g,
                                      int gains) {
   Eigen::MatrixXd whole = h.selfadjointView<Eigen::Upper>();
   auto of_gains = whole.topLeftCorner(gains, gains);
   const double mean = of_gains.diagonal().mean();
-  for (int k = 0; k < gains; ++k)
-    if (!(of_gains(k, k) > 0.0)) of_gains(k, k) = mean;
+  for (Eigen::Index k = 0; k < whole.rows(); ++k)
+    if (!(whole(k, k) > 0.0)) whole(k, k) = mean;
   of_gains.array() += mean / gains;
   const Eigen::LDLT<Eigen::MatrixXd> solver(whole);
   Eigen::VectorXd x = solver.solve(g);
@@ -236,8 +245,8 @@ std::optional<double> jackknife(const std::vector<Sums>& blocks, const Sums& all
 
 std::optional<LightFit> fit_light(const std::vector<LightSight>& sights,
                                   const std::vector<Emitter>& lights, double unit_q,
-                                  double normal_sigma_factor) {
-  Fit fit(sights, lights, normal_sigma_factor);
+                                  const Belief& belief) {
+  Fit fit(sights, lights, belief);
   LightFit found;
   std::vector<Sums> blocks;
   Sums all;
@@ -295,14 +304,16 @@ std::optional<LightScale> scale_from_light(const std::vector<LightSight>& sights
   std::nth_element(depths.begin(), middle, depths.end());
   const double unit_q = *middle / beside_mm;
 
-  const auto found = fit_light(sights, lights, unit_q, 1.0);
-  const auto stiffer = fit_light(sights, lights, unit_q, 1.0 / kNormalSigmaFactor);
-  const auto looser = fit_light(sights, lights, unit_q, kNormalSigmaFactor);
-  if (!found || !stiffer || !looser || !(found->q > 0.0)) return std::nullopt;
+  const auto fit = [&](const Belief& belief) { return fit_light(sights, lights, unit_q, belief); };
+  const auto found = fit({}), stiffer = fit({.normal_sigma_factor = 1.0 / kNormalSigmaFactor}),
+             looser = fit({.normal_sigma_factor = kNormalSigmaFactor}),
+             uneven = fit({.uneven = true});
+  if (!found || !stiffer || !looser || !uneven || !(found->q > 0.0)) return std::nullopt;
   const auto [least, most] = std::minmax({found->q, stiffer->q, looser->q});
+  const double by_normals = 0.5 * (most - least), by_slope = 0.5 * (uneven->q - found->q);
   LightScale scale;
   scale.mm_per_unit = 1.0 / found->q;
-  scale.sigma_share = std::hypot(found->sigma_q, 0.5 * (most - least)) / found->q;
+  scale.sigma_share = std::hypot(found->sigma_q, by_normals, by_slope) / found->q;
   scale.sights = sights.size();
   scale.spread_ln = found->spread_ln;
   return scale.sigma_share <= kMostUncertain ? std::optional(scale) : std::nullopt;

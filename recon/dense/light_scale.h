@@ -30,20 +30,20 @@ std::optional<ReceivedLight> received_light(const LightSight& sight,
 
 /// Least squares, with robust weights, over q and what is not known of wall and camera:
 ///   ln level = ln albedo(track) + ln gain(key frame) + ln light(q, normal(track))
-///              + 4 ln cos(angle to the axis) + c_1 r^2 + c_2 r^4 + c_3 r^6 + c_4 x + c_5 y
-///              + c_6 ((1 - cos_in)^5 + (1 - cos_out)^5)
-/// (r^2 = x^2 + y^2 in the picture: the lens' fall-off beyond the natural one, which follows the
-/// ray, not the pixel; c_4, c_5: that fall-off's centre is not the principal point, nor is any
-/// picture's light even to a thousandth; c_6: what a wet layer keeps from the wall, after Schlick;
-/// normals stray from those of the patches by their own sigma, kLeastNormalSigmaRad at least).
-/// Light tells how far the wall is only where it does not come from the camera's centre, so that
-/// the distances to both differ: a picture brighter on one side by 1.5 thousandths looks like a
-/// lamp 1 % farther aside.
+///              + 4 ln cos(angle to the axis) + c_1 r^2 + c_2 r^4 + c_3 r^6
+///              + c_4 ((1 - cos_in)^5 + (1 - cos_out)^5)
+/// (r: in the picture, the lens' fall-off beyond the natural one, which follows the ray and not the
+/// pixel; c_4: what a wet layer keeps from the wall, after Schlick; normals stray from those of the
+/// patches by their own sigma, kLeastNormalSigmaRad at least). Light tells how far the wall is only
+/// where it does not come from the camera's centre, so that the distances to both differ.
 ///
-/// The uncertainty has two parts. The jackknife's over stretches of the path where tracks begin:
-/// neighbours share the errors of their normals and of the model. And, since a light aside looks
-/// much like a tilted wall, half the range of the answers as the normals are believed
-/// kNormalSigmaFactor times more and less. `sights` ascend by tracks. Empty where no light is
+/// The uncertainty has three parts. The jackknife's over stretches of the path where tracks begin:
+/// neighbours share the errors of their normals and of the model. Since a light aside looks much
+/// like a tilted wall, half the range of the answers as the normals are believed
+/// kNormalSigmaFactor times more and less. And, since it looks much like a picture that is brighter
+/// on one side (1.5 thousandths are 1 % of the length; a lens a little aside makes as much), half
+/// of how the answer moves when the picture's light may have a slope. `sights` ascend by tracks.
+/// Empty where no light is
 /// beside the camera or where the answer is no more certain than kMostUncertain.
 std::optional<LightScale> scale_from_light(const std::vector<LightSight>& sights,
                                            const std::vector<Emitter>& lights);
