@@ -4,8 +4,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -33,6 +35,17 @@ inline int wait_for(pid_t child) {
   int status = 0;
   waitpid(child, &status, 0);
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+/// Has it said by now that Ctrl-C is its own affair (proc(5), SigCgt)? Before that Ctrl-C just ends
+/// it.
+inline bool handles_interrupt(pid_t child) {
+  std::ifstream status("/proc/" + std::to_string(child) + "/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("SigCgt:"))
+      return std::stoull(line.substr(line.find_last_of(" \t") + 1), nullptr, 16) >> (SIGINT - 1) &
+             1;
+  return false;
 }
 
 }  // namespace rugae
