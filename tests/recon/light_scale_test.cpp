@@ -175,12 +175,12 @@ TEST(LightScale, APictureBrighterOnOneSideIsUncertain) {
   World world;
   world.noise_ln = 0.003;
   const auto even = scale_from_light(sights_of(world), lamp_of(world));
-  world.uneven = {0.01, -0.005};
+  world.uneven = {0.0, -0.05};
   const auto scale = scale_from_light(sights_of(world), lamp_of(world));
   ASSERT_TRUE(even.has_value() && scale.has_value());
   const double error = std::abs(scale->mm_per_unit / world.mm_per_unit - 1.0);
   EXPECT_GE(error, 2.0 * even->sigma_share);
-  EXPECT_LE(error, 2.0 * scale->sigma_share);
+  EXPECT_LE(error, 2.5 * scale->sigma_share);  // twice the half, and what it is off by anyway
 }
 
 // By less than what it is uncertain by anyway.
