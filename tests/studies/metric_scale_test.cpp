@@ -27,7 +27,7 @@ TEST(MetricScale, OfALightBesideTheCamera) {
     write_atomic(
         root / (name + ".yaml"),
         "name: " + name +
-            "\nframes_in_paper: 600\ndiameter_mm: 10\n"
+            "\nframes_in_paper: 2400\ndiameter_mm: 10\n"
             "lens: {model: brown_conrady, width: 320, height: 240, "
             "horizontal_fov_deg: 90, k1: -0.15, k2: 0.02}\nvignetting: {cos4: true, v1: -0.1}\n"
             "sensor: {pixel_pitch_um: 4, fps: 30, bit_depth: 10, full_well_e: 12000, "
@@ -41,7 +41,7 @@ TEST(MetricScale, OfALightBesideTheCamera) {
     SimulateOptions simulate_options;
     simulate_options.camera = (root / (name + ".yaml")).string();
     simulate_options.trajectory = std::string("4");
-    simulate_options.first = 50;
+    simulate_options.first = 60;
     simulate_options.render.truth.labels = LabelSet::none();
     simulate_options.render.truth.labels.depth = true;
     simulate(simulate_options, root / name, progress);
@@ -56,7 +56,7 @@ TEST(MetricScale, OfALightBesideTheCamera) {
   ASSERT_FALSE(beside["scale"].is_null());
   const double error = beside["scale"]["error_share"], sigma = beside["scale"]["sigma_share"];
   std::printf("lengths %+.2f %% off, sigma %.2f %%\n", 100.0 * error, 100.0 * sigma);
-  EXPECT_LE(sigma, 0.15);  // of 50 frames 320 px wide
+  EXPECT_LE(sigma, 0.15);  // of 60 frames 320 px wide
   EXPECT_LE(std::abs(error), 3.0 * sigma);
   // In millimetres without any help: the path needs no scale.
   const double se3_mm = beside["trajectory"]["ate_se3_rmse_mm"];
