@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kBlocks = 16;        // of the jackknife
 constexpr int kRounds = 30;        // of weights and q in turn, at most
-constexpr double kSettled = 1e-4;  // share of q that a round moves it by
+constexpr double kSettled = 1e-5;  // share of q that a round moves it by
 /// Of incidence: ln cos is so steep beyond that a few tilts drive the rounds apart.
 constexpr double kLeastCosine = 0.2;
 constexpr double kSigmaOfMad = 1.4826;  // of normal errors
@@ -100,8 +100,9 @@ class Fit {
                  behind = received_light(sight, lights_, q - step_q);
       // The way in, from where most of the light comes.
       const double in = at ? sight.normal_cam.dot(at->per_normal.normalized()) : 0.0;
-      if (!(in >= kLeastCosine) || !ahead || !behind) {
-        weight_[i] = 0.0;  // turned away from the light, as far as is known
+      const double off_axis_cosine = sight.p_cam.normalized().z();
+      if (!(in >= kLeastCosine) || !ahead || !behind || !(off_axis_cosine > 0.0)) {
+        weight_[i] = 0.0;  // turned away from the light, as far as is known, or behind the lens
         return;
       }
       if (weight_[i] == 0.0) weight_[i] = 1.0;
@@ -112,7 +113,7 @@ class Fit {
           (ahead->ln - behind->ln) / (2.0 * kStepShare);
       own_[i] = {1.0, at->per_normal.dot(sight.tangent_x_cam),
                  at->per_normal.dot(sight.tangent_y_cam)};
-      left_[i] = sight.ln_level - at->ln - 4.0 * std::log(sight.p_cam.normalized().z());
+      left_[i] = sight.ln_level - at->ln - 4.0 * std::log(off_axis_cosine);
     });
   }
 

@@ -32,10 +32,11 @@ std::optional<ReceivedLight> received_light(const LightSight& sight,
 ///   ln level = ln albedo(track) + ln gain(key frame) + ln light(q, normal(track))
 ///              + 4 ln cos(angle to the axis) + c_1 r^2 + c_2 r^4 + c_3 r^6
 ///              + c_4 ((1 - cos_in)^5 + (1 - cos_out)^5)
-/// (r: in the picture, the lens' fall-off beyond the natural one, which follows the ray and not the
-/// pixel; c_4: what a wet layer keeps from the wall, after Schlick; normals stray from those of the
-/// patches by their own sigma, kLeastNormalSigmaRad at least). Light tells how far the wall is only
-/// where it does not come from the camera's centre, so that the distances to both differ.
+/// (4 ln cos: the natural fall-off, which follows the ray and not the pixel, docs/physics.md; r: in
+/// the picture, the lens' fall-off beyond that; c_4: what a wet layer keeps from the wall, after
+/// Schlick; normals stray from those of the patches by their own sigma, kLeastNormalSigmaRad at
+/// least). Light tells how far the wall is only where it does not come from the camera's centre, so
+/// that the distances to both differ.
 ///
 /// The uncertainty has three parts. The jackknife's over stretches of the path where tracks begin:
 /// neighbours share the errors of their normals and of the model. Since a light aside looks much

@@ -13,6 +13,7 @@
 
 #include "core/files.h"
 #include "tests/apps/child.h"
+#include "tests/apps/small_camera.h"
 
 namespace rugae {
 namespace {
@@ -27,11 +28,7 @@ class Interrupted : public ::testing::Test {
   void SetUp() override {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
-    write_atomic(folder_ / "small.yaml",
-                 "name: small\nframes_in_paper: 0\ndiameter_mm: 5\n"
-                 "lens: {model: brown_conrady, width: 320, height: 240, horizontal_fov_deg: 90}\n"
-                 "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 10000, "
-                 "read_noise_e: 5, shutter: global}\n");
+    write_small_camera(folder_, 320, 240);
   }
   void TearDown() override { fs::remove_all(folder_); }
 

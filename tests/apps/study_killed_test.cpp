@@ -15,6 +15,7 @@
 #include "core/files.h"
 #include "core/random.h"
 #include "tests/apps/child.h"
+#include "tests/apps/small_camera.h"
 
 namespace rugae {
 namespace {
@@ -30,11 +31,7 @@ class StudyKilled : public ::testing::Test {
   void SetUp() override {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
-    write_atomic(folder_ / "small.yaml",
-                 "name: small\nframes_in_paper: 0\ndiameter_mm: 5\n"
-                 "lens: {model: brown_conrady, width: 160, height: 120, horizontal_fov_deg: 90}\n"
-                 "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 10000, "
-                 "read_noise_e: 5, shutter: global}\n");
+    write_small_camera(folder_, 160, 120);
     write_atomic(folder_ / "short.yaml", "like: \"1\"\nlength_cm: 4\npasses: 1\n");
     write_atomic(folder_ / "study.yaml",
                  "title: Killed\nresolution: coarse\nframes: 8\ncameras: [small.yaml]\n"

@@ -169,6 +169,18 @@ TEST(LightScale, GrazingLightMovesLittle) {
   EXPECT_LE(spoilt->sigma_share, 2.0 * clean->sigma_share);
 }
 
+// A fisheye sees what lies behind its own plane, where the natural fall-off leaves no light.
+TEST(LightScale, WhatLiesBehindTheLensPlaneSaysNothing) {
+  std::vector<LightSight> sights = sights_of(World{});
+  for (std::size_t i = 0; i < sights.size(); i += 50) {
+    sights[i].p_cam.z() *= -0.1;
+    sights[i].normal_cam = -sights[i].p_cam.normalized();
+  }
+  const auto scale = scale_from_light(sights, lamp_of(World{}));
+  ASSERT_TRUE(scale.has_value());
+  EXPECT_NEAR(scale->mm_per_unit / World{}.mm_per_unit, 1.0, kSettled);
+}
+
 // As a lens that sits a little aside makes it. It is taken for a lamp farther aside, which the
 // stated uncertainty says.
 TEST(LightScale, APictureBrighterOnOneSideIsUncertain) {
