@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "core/check.h"
+#include "recon/block_search.h"
+#include "recon/small_blur.h"
 
 namespace rugae {
 namespace {
@@ -56,22 +58,25 @@ cv::Mat even_light(const cv::Mat& gray, const cv::Mat& valid) {
   cv::Mat share;  // of a pixel's surroundings that is valid
   if (!everywhere) {
     cv::Mat(valid != 0).convertTo(share, CV_32F, 1.0 / 255.0);
-    cv::GaussianBlur(share, share, {}, sigma);
-    cv::max(share, 1e-3, share);
+    share = cv::max(small_blur(share, sigma, cv::BORDER_REFLECT), 1e-3);
   }
+  // Both as small as the blur leaves them.
   const auto mean_of = [&](const cv::Mat& values) {
-    cv::Mat mean;
-    cv::GaussianBlur(values, mean, {}, sigma);
+    const cv::Mat mean = small_blur(values, sigma, cv::BORDER_REFLECT);
     return everywhere ? mean : cv::Mat(mean / share);
   };
-  cv::Mat value, deviation;
+  const auto enlarged = [&](const cv::Mat& small) {
+    cv::Mat large;
+    cv::resize(small, large, gray.size(), 0, 0, cv::INTER_LINEAR);
+    return large;
+  };
+  cv::Mat value, deviation, even, result;
   gray.convertTo(value, CV_32F);
   if (!everywhere) value.setTo(0.0, valid == 0);
-  value -= mean_of(value);
+  value -= enlarged(mean_of(value));
   if (!everywhere) value.setTo(0.0, valid == 0);
   cv::sqrt(mean_of(value.mul(value)), deviation);
-  const cv::Mat even = value / (deviation + kFloor);
-  cv::Mat result;
+  cv::divide(value, enlarged(deviation + kFloor), even);
   even.convertTo(result, CV_8U, kContrast, kMiddle);
   return result;
 }
@@ -99,19 +104,10 @@ cv::Mat coarse_flow(const FlowImage& reference, const FlowImage& moving) {
   if (columns < 2 || rows < 2) return flow;
   const double shrink = std::max(1.0, flow.cols / static_cast<double>(kCoarseWidthPx));
 
-  cv::Mat wide;
-  cv::copyMakeBorder(b, wide, kReachPx, kReachPx, kReachPx, kReachPx, cv::BORDER_CONSTANT,
-                     cv::Scalar(128));
+  const BlockSearch search(b, 2 * kCellPx, kReachPx);
   Scores scores;
-  const int block = 2 * kCellPx;
-  for (int y = 0; y < rows; ++y) {
-    for (int x = 0; x < columns; ++x) {
-      const cv::Rect at(x * kCellPx, y * kCellPx, block, block);
-      const cv::Rect around(at.x, at.y, block + 2 * kReachPx, block + 2 * kReachPx);
-      scores.emplace_back();
-      cv::matchTemplate(wide(around), a(at), scores.back(), cv::TM_CCOEFF_NORMED);
-    }
-  }
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) scores.push_back(search(a, {x * kCellPx, y * kCellPx}));
   for (int round = 0; round < kSupportRounds; ++round) scores = supported(scores, columns, rows);
 
   // The best motion of each block, at its centre; linear between the centres.
@@ -125,17 +121,29 @@ cv::Mat coarse_flow(const FlowImage& reference, const FlowImage& moving) {
                                      static_cast<float>((best.y - kReachPx) * shrink)};
     }
   }
+  // Which of the centres a pixel lies behind, and how far behind it.
+  struct Between {
+    int first;
+    float share;
+  };
+  const auto between = [&](int pixel, int centres) {
+    const double at =
+        std::clamp(((pixel + 0.5) / shrink - kCellPx) / kCellPx, 0.0, centres - 1.001);
+    const int first = static_cast<int>(at);
+    return Between{first, static_cast<float>(at - first)};
+  };
+  std::vector<Between> across;
+  for (int x = 0; x < flow.cols; ++x) across.push_back(between(x, columns));
+  std::vector<cv::Vec2f> row(static_cast<std::size_t>(columns));  // of centres
   for (int y = 0; y < flow.rows; ++y) {
-    const double v = std::clamp(((y + 0.5) / shrink - kCellPx) / kCellPx, 0.0, rows - 1.001);
-    const int iv = static_cast<int>(v);
-    const float fv = static_cast<float>(v - iv);
+    const Between down = between(y, rows);
+    for (int x = 0; x < columns; ++x)
+      row[x] = (1.0F - down.share) * motions.at<cv::Vec2f>(down.first, x) +
+               down.share * motions.at<cv::Vec2f>(down.first + 1, x);
+    auto* to = flow.ptr<cv::Vec2f>(y);
     for (int x = 0; x < flow.cols; ++x) {
-      const double u = std::clamp(((x + 0.5) / shrink - kCellPx) / kCellPx, 0.0, columns - 1.001);
-      const int iu = static_cast<int>(u);
-      const float fu = static_cast<float>(u - iu);
-      const auto at = [&](int i, int j) { return motions.at<cv::Vec2f>(iv + j, iu + i); };
-      flow.at<cv::Vec2f>(y, x) = (1 - fv) * ((1 - fu) * at(0, 0) + fu * at(1, 0)) +
-                                 fv * ((1 - fu) * at(0, 1) + fu * at(1, 1));
+      const auto& [first, share] = across[x];
+      to[x] = (1.0F - share) * row[first] + share * row[first + 1];
     }
   }
   return flow;
