@@ -15,10 +15,11 @@ namespace rugae {
 namespace {
 
 /// A straight edge is curved by the lens, by an amount that grows with the square of its length:
-/// the box around the projected corners grows by one pixel, and by a quarter of its size once it
-/// measures this share of the picture's width.
+/// the box around the projected corners grows by a quarter of its size once it measures this share
+/// of the picture's width, by the square's part of that before, and by a little for rounding.
 constexpr double kCurvedShare = 0.125;
 constexpr double kCurvedEdgeMargin = 0.25;
+constexpr double kRoundingPx = 0.05;
 /// A ray at a corner of the triangle must not be lost to rounding.
 constexpr double kCosineRounding = 1e-12;
 
@@ -134,11 +135,12 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const MovingPose& camera,
     }
     // Part of a triangle that is not projected whole may cover anything within its cone.
     if (projected < 3) box = {Vec2(0, 0), Vec2(lens.width, lens.height)};
-    const double margin = 1.0 + kCurvedEdgeMargin * curved * size_px;
-    const int left = std::max(0, static_cast<int>(std::floor(box.min().x() - margin)));
-    const int top = std::max(0, static_cast<int>(std::floor(box.min().y() - margin)));
-    const int right = std::min(lens.width - 1.0, std::ceil(box.max().x() + margin));
-    const int bottom = std::min(lens.height - 1.0, std::ceil(box.max().y() + margin));
+    const double margin = kRoundingPx + kCurvedEdgeMargin * curved * size_px;
+    // Pixels with centres in the box.
+    const int left = std::max(0.0, std::ceil(box.min().x() - margin - 0.5));
+    const int top = std::max(0.0, std::ceil(box.min().y() - margin - 0.5));
+    const int right = std::min(lens.width - 1.0, std::floor(box.max().x() + margin - 0.5));
+    const int bottom = std::min(lens.height - 1.0, std::floor(box.max().y() + margin - 0.5));
     if (left > right || top > bottom) continue;
     const bool everywhere = seen.half_angle_rad == kPi;
     const double seen_cosine = std::cos(seen.half_angle_rad) - kCosineRounding;
