@@ -57,6 +57,9 @@ PointRefiner::PointRefiner(const PointRefinementOptions& options)
   const std::size_t whole = (count_ + kLanes - 1) / kLanes * kLanes;
   dx_.resize(whole, 0.0F);
   dy_.resize(whole, 0.0F);
+  at_.resize(whole, at_.front());
+  const Float4 lane = _mm_setr_ps(0.0F, 1.0F, 2.0F, 3.0F);
+  last_ = _mm_cmplt_ps(lane, splat(static_cast<float>(count_ - (whole - kLanes))));
 }
 
 std::optional<PointTemplate> PointRefiner::make_template(const cv::Mat& reference,
@@ -80,40 +83,56 @@ std::optional<PointTemplate> PointRefiner::make_template(const cv::Mat& referenc
           (1 - fy) * ((1 - fx) * p0[x] + fx * p0[x + 1]) + fy * ((1 - fx) * p1[x] + fx * p1[x + 1]);
   }
   PointTemplate t;
-  t.fours.assign(kLists * dx_.size(), 0.0F);
-  const auto entry = [&t](std::size_t pixel, std::size_t list) -> float& {
-    return t.fours[pixel / kLanes * kLists * kLanes + list * kLanes + pixel % kLanes];
+  t.fours.resize(kLists * dx_.size());
+  const auto groups = static_cast<std::ptrdiff_t>(dx_.size() / kLanes);
+  const auto list = [&t](std::ptrdiff_t group, std::size_t of) {
+    return t.fours.data() + (group * static_cast<std::ptrdiff_t>(kLists) + of) * kLanes;
   };
-  double sum[kLists] = {};
-  for (std::size_t i = 0; i < count_; ++i) {
-    const float* p = square.data() + at_[i];
-    const float of_pixel[kLists] = {p[0], 0.5F * (p[1] - p[-1]), 0.5F * (p[side] - p[-side])};
-    for (std::size_t list = 0; list < kLists; ++list) {
-      entry(i, list) = of_pixel[list];
-      sum[list] += of_pixel[list];
+  const Float4 zero = _mm_setzero_ps(), half = splat(0.5F);
+  Float4 sum[kLists] = {zero, zero, zero};
+  for (std::ptrdiff_t group = 0; group < groups; ++group) {
+    const int* at = &at_[group * kLanes];
+    const auto four = [&](std::ptrdiff_t shift) {
+      const float* p = square.data() + shift;
+      return _mm_setr_ps(p[at[0]], p[at[1]], p[at[2]], p[at[3]]);
+    };
+    const Float4 of_pixels[kLists] = {four(0), half * (four(1) - four(-1)),
+                                      half * (four(side) - four(-side))};
+    for (std::size_t l = 0; l < kLists; ++l) {
+      const Float4 values = group + 1 < groups ? of_pixels[l] : _mm_and_ps(last_, of_pixels[l]);
+      _mm_storeu_ps(list(group, l), values);
+      sum[l] = sum[l] + values;
     }
   }
-  double along[kLists] = {};  // values . each list
-  for (std::size_t i = 0; i < count_; ++i) {
-    for (std::size_t list = 0; list < kLists; ++list) {
-      entry(i, list) -= static_cast<float>(sum[list] / static_cast<double>(count_));
-      along[list] += static_cast<double>(entry(i, 0)) * entry(i, list);
+  Float4 mean[kLists], along[kLists] = {zero, zero, zero};  // values . each list
+  for (std::size_t l = 0; l < kLists; ++l)
+    mean[l] = splat(static_cast<float>(sum_of(sum[l]) / static_cast<double>(count_)));
+  for (std::ptrdiff_t group = 0; group < groups; ++group)
+    for (std::size_t l = 0; l < kLists; ++l) {
+      Float4 values = _mm_loadu_ps(list(group, l)) - mean[l];
+      if (group + 1 == groups) values = _mm_and_ps(last_, values);
+      _mm_storeu_ps(list(group, l), values);
+      along[l] = along[l] + _mm_loadu_ps(list(group, 0)) * values;
     }
-  }
-  t.norm = std::sqrt(along[0]);
+  const double squares = sum_of(along[0]);
+  t.norm = std::sqrt(squares);
   if (!(t.norm > 0.0)) return std::nullopt;
   // A change of gain must not look like motion: the gradient images lose their part along the
   // values.
-  const float share_x = static_cast<float>(along[1] / along[0]),
-              share_y = static_cast<float>(along[2] / along[0]);
-  double xx = 0.0, xy = 0.0, yy = 0.0;
-  for (std::size_t i = 0; i < count_; ++i) {
-    const double gx = entry(i, 1) -= share_x * entry(i, 0);
-    const double gy = entry(i, 2) -= share_y * entry(i, 0);
-    xx += gx * gx;
-    xy += gx * gy;
-    yy += gy * gy;
+  const Float4 share_x = splat(static_cast<float>(sum_of(along[1]) / squares)),
+               share_y = splat(static_cast<float>(sum_of(along[2]) / squares));
+  Float4 xx_sum = zero, xy_sum = zero, yy_sum = zero;
+  for (std::ptrdiff_t group = 0; group < groups; ++group) {
+    const Float4 values = _mm_loadu_ps(list(group, 0));
+    const Float4 gx = _mm_loadu_ps(list(group, 1)) - share_x * values;
+    const Float4 gy = _mm_loadu_ps(list(group, 2)) - share_y * values;
+    _mm_storeu_ps(list(group, 1), gx);
+    _mm_storeu_ps(list(group, 2), gy);
+    xx_sum = xx_sum + gx * gx;
+    xy_sum = xy_sum + gx * gy;
+    yy_sum = yy_sum + gy * gy;
   }
+  const double xx = sum_of(xx_sum), xy = sum_of(xy_sum), yy = sum_of(yy_sum);
   Mat2 hessian;
   hessian << xx, xy, xy, yy;
   t.weakest = Eigen::SelfAdjointEigenSolver<Mat2>(hessian, Eigen::EigenvaluesOnly).eigenvalues()[0];
@@ -177,10 +196,7 @@ std::optional<PointRefiner::Comparison> PointRefiner::compare(const PointTemplat
   };
   const std::size_t last = dx_.size() - kLanes;
   for (std::size_t i = 0; i < last; i += kLanes) add(values_of(i), &sought.fours[kLists * i]);
-  // What fills the list up is no pixel.
-  const Float4 lane = _mm_setr_ps(0.0F, 1.0F, 2.0F, 3.0F);
-  const Float4 pixels = _mm_cmplt_ps(lane, splat(static_cast<float>(count_ - last)));
-  add(_mm_and_ps(pixels, values_of(last)), &sought.fours[kLists * last]);
+  add(_mm_and_ps(last_, values_of(last)), &sought.fours[kLists * last]);
   // The template's lists have no mean: only the squares hold that of the values.
   const double all = sum_of(sum);
   return Comparison{sum_of(squares) - all * all / static_cast<double>(count_), sum_of(product),

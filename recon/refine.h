@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/float4.h"
 #include "core/types.h"
 
 namespace rugae {
@@ -56,6 +57,7 @@ class PointRefiner {
   std::size_t count_ = 0;       // pixels of the disc
   std::vector<float> dx_, dy_;  // of each pixel from the centre; filled up with zeros to fours
   std::vector<int> at_;         // its place in the square of side 2 radius + 3 around the disc
+  Float4 last_;                 // the mask of the last four that are pixels and do not fill up
 };
 
 /// One point alone.
