@@ -1,23 +1,12 @@
 #pragma once
-// Farneback's optical flow (SCIA 2003, doi:10.1007/3-540-45103-X_50) in two halves: the polynomials
-// of an image, which all pairs it takes part in share, and the flow of a pair.
+// Farneback's optical flow (SCIA 2003, doi:10.1007/3-540-45103-X_50) of a pair of images, from the
+// polynomials that all pairs an image takes part in share.
 
 #include <opencv2/core/mat.hpp>
-#include <vector>
+
+#include "recon/polynomials.h"
 
 namespace rugae {
-
-/// Around each pixel of a pyramid level f(x) ~ x^T A x + b^T x + c; c is not kept.
-struct PolynomialLevel {
-  cv::Mat terms;  // CV_32FC4: b_y, b_x, A_yy, A_xx
-  cv::Mat mixed;  // CV_32F: 2 A_xy
-};
-
-/// From the full image on, each level half as large.
-using PolynomialPyramid = std::vector<PolynomialLevel>;
-
-/// The polynomials of `image` (CV_8U, at least 4 x 4).
-PolynomialPyramid expand_polynomials(const cv::Mat& image);
 
 /// The flow (CV_32FC2, px) from `reference` to `moving`, two pyramids of one shape, started at
 /// `initial` (CV_32FC2 of the full size). What OpenCV's calcOpticalFlowFarneback computes, up to
