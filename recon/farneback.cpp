@@ -30,7 +30,7 @@ struct Terms {
   Float4 mixed;
 };
 
-Terms terms_at(const PolynomialLevel& level, int x, int y) {
+[[gnu::always_inline]] inline Terms terms_at(const PolynomialLevel& level, int x, int y) {
   const float* p = level.terms.ptr<float>(y) + static_cast<std::ptrdiff_t>(4) * x;
   return {
       transposed(_mm_loadu_ps(p), _mm_loadu_ps(p + 4), _mm_loadu_ps(p + 8), _mm_loadu_ps(p + 12)),
@@ -38,7 +38,8 @@ Terms terms_at(const PolynomialLevel& level, int x, int y) {
 }
 
 // Bilinear, at four places given by their top left pixels and fractions.
-Terms terms_between(const PolynomialLevel& level, const int (&at)[kLanes], Float4 fx, Float4 fy) {
+[[gnu::always_inline]] inline Terms terms_between(const PolynomialLevel& level,
+                                                  const int (&at)[kLanes], Float4 fx, Float4 fy) {
   const Float4 one = splat(1.0F);
   const Float4 w00 = (one - fx) * (one - fy), w10 = fx * (one - fy), w01 = (one - fx) * fy,
                w11 = fx * fy;

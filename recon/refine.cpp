@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/check.h"
-#include "core/float4.h"
+#include "core/float8.h"
 
 namespace rugae {
 namespace {
@@ -14,25 +14,14 @@ namespace {
 // A step below this is the last: each is a fraction of the one before, so that what is left is a
 // small part of the tenth of a pixel to which noise lets a place be known.
 constexpr double kNegligiblePx = 0.005;
-constexpr std::size_t kLanes = 4;
+constexpr std::size_t kLanes = 8, kHalf = kLanes / 2;
 constexpr double kMinTexture = 1e-9;  // eigenvalue of the Hessian, values in [0, 1]
 constexpr std::size_t kLists = 3;     // of a template: values, derivatives by x and by y
 
 double sum_of(Float4 v) {
-  float lane[kLanes];
+  float lane[kHalf];
   _mm_storeu_ps(lane, v);
   return (static_cast<double>(lane[0]) + lane[1]) + (static_cast<double>(lane[2]) + lane[3]);
-}
-
-// Two neighbours a place, at four places: the left ones and the right ones.
-struct Neighbours {
-  Float4 left, right;
-};
-Neighbours neighbours(const float* base, const int (&at)[kLanes]) {
-  const Float4 first = two_and_two(base + at[0], base + at[1]);
-  const Float4 last = two_and_two(base + at[2], base + at[3]);
-  return {_mm_shuffle_ps(first, last, _MM_SHUFFLE(2, 0, 2, 0)),
-          _mm_shuffle_ps(first, last, _MM_SHUFFLE(3, 1, 3, 1))};
 }
 
 }  // namespace
@@ -58,8 +47,8 @@ PointRefiner::PointRefiner(const PointRefinementOptions& options)
   dx_.resize(whole, 0.0F);
   dy_.resize(whole, 0.0F);
   at_.resize(whole, at_.front());
-  const Float4 lane = _mm_setr_ps(0.0F, 1.0F, 2.0F, 3.0F);
-  last_ = _mm_cmplt_ps(lane, splat(static_cast<float>(count_ - (whole - kLanes))));
+  pixel_.assign(count_, -1);
+  pixel_.resize(whole, 0);
 }
 
 std::optional<PointTemplate> PointRefiner::make_template(const cv::Mat& reference,
@@ -83,36 +72,37 @@ std::optional<PointTemplate> PointRefiner::make_template(const cv::Mat& referenc
           (1 - fy) * ((1 - fx) * p0[x] + fx * p0[x + 1]) + fy * ((1 - fx) * p1[x] + fx * p1[x + 1]);
   }
   PointTemplate t;
-  t.fours.resize(kLists * dx_.size());
-  const auto groups = static_cast<std::ptrdiff_t>(dx_.size() / kLanes);
-  const auto list = [&t](std::ptrdiff_t group, std::size_t of) {
-    return t.fours.data() + (group * static_cast<std::ptrdiff_t>(kLists) + of) * kLanes;
+  t.eights.resize(kLists * dx_.size());
+  const auto entry = [&t](std::size_t pixel, std::size_t list) {
+    return &t.eights[pixel / kLanes * kLists * kLanes + list * kLanes + pixel % kLanes];
+  };
+  const auto pixels_at = [this](std::size_t i) {
+    return _mm_castsi128_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(&pixel_[i])));
   };
   const Float4 zero = _mm_setzero_ps(), half = splat(0.5F);
   Float4 sum[kLists] = {zero, zero, zero};
-  for (std::ptrdiff_t group = 0; group < groups; ++group) {
-    const int* at = &at_[group * kLanes];
+  for (std::size_t i = 0; i < dx_.size(); i += kHalf) {
     const auto four = [&](std::ptrdiff_t shift) {
       const float* p = square.data() + shift;
-      return _mm_setr_ps(p[at[0]], p[at[1]], p[at[2]], p[at[3]]);
+      return _mm_setr_ps(p[at_[i]], p[at_[i + 1]], p[at_[i + 2]], p[at_[i + 3]]);
     };
     const Float4 of_pixels[kLists] = {four(0), half * (four(1) - four(-1)),
                                       half * (four(side) - four(-side))};
-    for (std::size_t l = 0; l < kLists; ++l) {
-      const Float4 values = group + 1 < groups ? of_pixels[l] : _mm_and_ps(last_, of_pixels[l]);
-      _mm_storeu_ps(list(group, l), values);
-      sum[l] = sum[l] + values;
+    const Float4 pixels = pixels_at(i);
+    for (std::size_t list = 0; list < kLists; ++list) {
+      const Float4 values = _mm_and_ps(pixels, of_pixels[list]);
+      _mm_storeu_ps(entry(i, list), values);
+      sum[list] = sum[list] + values;
     }
   }
   Float4 mean[kLists], along[kLists] = {zero, zero, zero};  // values . each list
-  for (std::size_t l = 0; l < kLists; ++l)
-    mean[l] = splat(static_cast<float>(sum_of(sum[l]) / static_cast<double>(count_)));
-  for (std::ptrdiff_t group = 0; group < groups; ++group)
-    for (std::size_t l = 0; l < kLists; ++l) {
-      Float4 values = _mm_loadu_ps(list(group, l)) - mean[l];
-      if (group + 1 == groups) values = _mm_and_ps(last_, values);
-      _mm_storeu_ps(list(group, l), values);
-      along[l] = along[l] + _mm_loadu_ps(list(group, 0)) * values;
+  for (std::size_t list = 0; list < kLists; ++list)
+    mean[list] = splat(static_cast<float>(sum_of(sum[list]) / static_cast<double>(count_)));
+  for (std::size_t i = 0; i < dx_.size(); i += kHalf)
+    for (std::size_t list = 0; list < kLists; ++list) {
+      const Float4 values = _mm_and_ps(pixels_at(i), _mm_loadu_ps(entry(i, list)) - mean[list]);
+      _mm_storeu_ps(entry(i, list), values);
+      along[list] = along[list] + _mm_loadu_ps(entry(i, 0)) * values;
     }
   const double squares = sum_of(along[0]);
   t.norm = std::sqrt(squares);
@@ -122,12 +112,12 @@ std::optional<PointTemplate> PointRefiner::make_template(const cv::Mat& referenc
   const Float4 share_x = splat(static_cast<float>(sum_of(along[1]) / squares)),
                share_y = splat(static_cast<float>(sum_of(along[2]) / squares));
   Float4 xx_sum = zero, xy_sum = zero, yy_sum = zero;
-  for (std::ptrdiff_t group = 0; group < groups; ++group) {
-    const Float4 values = _mm_loadu_ps(list(group, 0));
-    const Float4 gx = _mm_loadu_ps(list(group, 1)) - share_x * values;
-    const Float4 gy = _mm_loadu_ps(list(group, 2)) - share_y * values;
-    _mm_storeu_ps(list(group, 1), gx);
-    _mm_storeu_ps(list(group, 2), gy);
+  for (std::size_t i = 0; i < dx_.size(); i += kHalf) {
+    const Float4 values = _mm_loadu_ps(entry(i, 0));
+    const Float4 gx = _mm_loadu_ps(entry(i, 1)) - share_x * values;
+    const Float4 gy = _mm_loadu_ps(entry(i, 2)) - share_y * values;
+    _mm_storeu_ps(entry(i, 1), gx);
+    _mm_storeu_ps(entry(i, 2), gy);
     xx_sum = xx_sum + gx * gx;
     xy_sum = xy_sum + gx * gy;
     yy_sum = yy_sum + gy * gy;
@@ -142,11 +132,9 @@ std::optional<PointTemplate> PointRefiner::make_template(const cv::Mat& referenc
 }
 
 // With the image at place + linear * (dx, dy), bilinear; empty when a pixel is outside.
-std::optional<PointRefiner::Comparison> PointRefiner::compare(const PointTemplate& sought,
-                                                              const cv::Mat& image,
-                                                              const Vec2& place,
-                                                              const Mat2& linear) const {
-  // Whole and small numbers apart: a float holds the fraction of a place near zero alone.
+[[gnu::target_clones("avx2", "default")]] std::optional<PointRefiner::Comparison>
+PointRefiner::compare(const PointTemplate& sought, const cv::Mat& image, const Vec2& place,
+                      const Mat2& linear) const {
   const double u = place.x() - 0.5, v = place.y() - 0.5;
   // No pixel is further off than the radius: |linear d| <= radius |row of linear|.
   const double reach_x = options_.radius_px * linear.row(0).norm() + 1.0;
@@ -164,39 +152,50 @@ std::optional<PointRefiner::Comparison> PointRefiner::compare(const PointTemplat
         return std::nullopt;
     }
   }
-  const int base_x = static_cast<int>(std::floor(u)), base_y = static_cast<int>(std::floor(v));
-  const Float4 u0 = splat(static_cast<float>(u - base_x)),
-               v0 = splat(static_cast<float>(v - base_y));
-  const Float4 xx = splat(static_cast<float>(linear(0, 0))),
-               xy = splat(static_cast<float>(linear(0, 1))),
-               yx = splat(static_cast<float>(linear(1, 0))),
-               yy = splat(static_cast<float>(linear(1, 1)));
-  const int stride = static_cast<int>(image.step1());
-  const float* base = image.ptr<float>(0) + static_cast<std::ptrdiff_t>(base_y) * stride + base_x;
-  const Float4 row = splat(static_cast<float>(stride)), one = splat(1.0F);
-  const Float4 level = splat(*base);  // near the mean: squares of small numbers keep their digits
-  const auto values_of = [&](std::size_t i) {
-    const Float4 dx = _mm_loadu_ps(&dx_[i]), dy = _mm_loadu_ps(&dy_[i]);
-    const Floor x = floor_of(u0 + xx * dx + xy * dy), y = floor_of(v0 + yx * dx + yy * dy);
-    // Exact: whole numbers below 2^24.
+  // From a pixel at the top left of all of them: places are positive, so that cutting off their
+  // fractions is rounding down.
+  const double base_x = std::max(0.0, std::floor(u - reach_x)),
+               base_y = std::max(0.0, std::floor(v - reach_y));
+  const auto u0 = static_cast<float>(u - base_x), v0 = static_cast<float>(v - base_y);
+  const auto xx = static_cast<float>(linear(0, 0)), xy = static_cast<float>(linear(0, 1)),
+             yx = static_cast<float>(linear(1, 0)), yy = static_cast<float>(linear(1, 1));
+  const auto stride = static_cast<int>(image.step1());
+  const float* base = image.ptr<float>(static_cast<int>(base_y)) + static_cast<int>(base_x);
+  // Near the mean: squares of small numbers keep their digits.
+  const float level = image.at<float>(static_cast<int>(v), static_cast<int>(u));
+  Float8 sum{}, squares{}, product{}, along_x{}, along_y{};
+  const float* lists = sought.eights.data();
+  for (std::size_t i = 0; i < dx_.size(); i += kLanes, lists += kLists * kLanes) {
+    Float8 dx, dy, of_template, gradient_x, gradient_y;
+    Int8 pixel;
+    load(&dx_[i], dx);
+    load(&dy_[i], dy);
+    const Float8 x = u0 + xx * dx + xy * dy, y = v0 + yx * dx + yy * dy;
+    const Int8 left_px = __builtin_convertvector(x, Int8),
+               top_px = __builtin_convertvector(y, Int8);
+    const Int8 offset = top_px * stride + left_px;
     int at[kLanes];
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(at),
-                     _mm_cvttps_epi32(row * _mm_cvtepi32_ps(y.whole) + _mm_cvtepi32_ps(x.whole)));
-    const Neighbours above = neighbours(base, at), below = neighbours(base + stride, at);
-    return (one - y.part) * ((one - x.part) * above.left + x.part * above.right) +
-           y.part * ((one - x.part) * below.left + x.part * below.right) - level;
-  };
-  Float4 sum = _mm_setzero_ps(), squares = sum, product = sum, along_x = sum, along_y = sum;
-  const auto add = [&](Float4 value, const float* t) {
-    sum = sum + value;
-    squares = squares + value * value;
-    product = product + value * _mm_loadu_ps(t);
-    along_x = along_x + value * _mm_loadu_ps(t + kLanes);
-    along_y = along_y + value * _mm_loadu_ps(t + 2 * kLanes);
-  };
-  const std::size_t last = dx_.size() - kLanes;
-  for (std::size_t i = 0; i < last; i += kLanes) add(values_of(i), &sought.fours[kLists * i]);
-  add(_mm_and_ps(last_, values_of(last)), &sought.fours[kLists * last]);
+    std::memcpy(at, &offset, sizeof at);
+    Float8 top_left, top_right, low_left, low_right;
+    neighbours(base, at, top_left, top_right);
+    neighbours(base + stride, at, low_left, low_right);
+    const Float8 part_x = x - __builtin_convertvector(left_px, Float8),
+                 part_y = y - __builtin_convertvector(top_px, Float8);
+    const Float8 top = top_left + part_x * (top_right - top_left),
+                 low = low_left + part_x * (low_right - low_left);
+    load(&pixel_[i], pixel);
+    // What fills the lists up is no pixel.
+    const Float8 value = reinterpret_cast<Float8>(
+        reinterpret_cast<Int8>(top + part_y * (low - top) - level) & pixel);
+    load(lists, of_template);
+    load(lists + kLanes, gradient_x);
+    load(lists + 2 * kLanes, gradient_y);
+    sum += value;
+    squares += value * value;
+    product += value * of_template;
+    along_x += value * gradient_x;
+    along_y += value * gradient_y;
+  }
   // The template's lists have no mean: only the squares hold that of the values.
   const double all = sum_of(sum);
   return Comparison{sum_of(squares) - all * all / static_cast<double>(count_), sum_of(product),
@@ -205,9 +204,9 @@ std::optional<PointRefiner::Comparison> PointRefiner::compare(const PointTemplat
 
 std::optional<Vec2> PointRefiner::operator()(const PointTemplate& sought, const cv::Mat& moving,
                                              const Vec2& start_px, const Mat2& linear) const {
-  check(sought.fours.size() == kLists * dx_.size(),
+  check(sought.eights.size() == kLists * dx_.size(),
         "point refinement: the template has {} numbers, expected {} of this radius",
-        sought.fours.size(), kLists * dx_.size());
+        sought.eights.size(), kLists * dx_.size());
   Vec2 place = start_px;
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
     if (!place.allFinite()) return std::nullopt;

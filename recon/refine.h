@@ -6,7 +6,6 @@
 #include <optional>
 #include <vector>
 
-#include "core/float4.h"
 #include "core/types.h"
 
 namespace rugae {
@@ -21,9 +20,9 @@ struct PointRefinementOptions {
 
 /// What is looked for, a disc of a picture: made once, found in many.
 struct PointTemplate {
-  /// Four values, their four derivatives by x and by y, and so on over the disc, filled up with
+  /// Eight values, their eight derivatives by x and by y, and so on over the disc, filled up with
   /// zeros; means removed, and from the derivatives what is along the values.
-  std::vector<float> fours;
+  std::vector<float> eights;
   double norm = 0.0;                    // of the values
   Mat2 inverse_hessian = Mat2::Zero();  // of the squared difference over the place
   double weakest = 0.0;                 // eigenvalue of the Hessian
@@ -55,9 +54,9 @@ class PointRefiner {
   PointRefinementOptions options_;
   int radius_ = 0;              // whole px
   std::size_t count_ = 0;       // pixels of the disc
-  std::vector<float> dx_, dy_;  // of each pixel from the centre; filled up with zeros to fours
+  std::vector<float> dx_, dy_;  // of each pixel from the centre; filled up with zeros to eights
   std::vector<int> at_;         // its place in the square of side 2 radius + 3 around the disc
-  Float4 last_;                 // the mask of the last four that are pixels and do not fill up
+  std::vector<int> pixel_;      // all bits set for a pixel, none for what fills up
 };
 
 /// One point alone.

@@ -12,6 +12,8 @@ namespace rugae {
 namespace {
 
 constexpr double kReferenceWidthPx = 640.0;
+// Inpainting looks at what lies within its radius, and at the differences there.
+constexpr int kBeyondRadiusPx = 3;
 
 // 255 where the value is at least mean + standard deviation, both of the field's; nothing on a
 // constant image, whose every pixel would pass.
@@ -54,12 +56,26 @@ cv::Mat detect_reflections(const cv::Mat& gray, const ReflectionOptions& options
   return field.empty() ? found : cv::Mat(found & field);
 }
 
+// Piece by piece, where pieces are too far apart to see each other: the front that OpenCV moves
+// over all of them at once is a sorted list, and what a pixel costs grows with its length.
 cv::Mat suppress_reflections(const cv::Mat& image, const cv::Mat& reflection,
                              const ReflectionOptions& options) {
-  if (cv::countNonZero(reflection) == 0) return image.clone();
   const int method = options.inpainting == Inpainting::telea ? cv::INPAINT_TELEA : cv::INPAINT_NS;
-  cv::Mat painted;
-  cv::inpaint(image, reflection, painted, options.inpaint_radius_px, method);
+  cv::Mat around, labels, boxes, centres;
+  const int reach_px = static_cast<int>(std::ceil(options.inpaint_radius_px)) + kBeyondRadiusPx;
+  const int side = 2 * reach_px + 1;
+  cv::dilate(reflection, around, cv::Mat::ones(side, side, CV_8U));
+  const int pieces = cv::connectedComponentsWithStats(around, labels, boxes, centres);
+  cv::Mat painted = image.clone();
+  for (int piece = 1; piece < pieces; ++piece) {  // 0 is where there is nothing to paint
+    const cv::Rect box(
+        boxes.at<int>(piece, cv::CC_STAT_LEFT), boxes.at<int>(piece, cv::CC_STAT_TOP),
+        boxes.at<int>(piece, cv::CC_STAT_WIDTH), boxes.at<int>(piece, cv::CC_STAT_HEIGHT));
+    const cv::Mat mask = (labels(box) == piece) & reflection(box);
+    cv::Mat part;
+    cv::inpaint(image(box), mask, part, options.inpaint_radius_px, method);
+    part.copyTo(painted(box), mask);
+  }
   return painted;
 }
 

@@ -2,6 +2,7 @@
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <opencv2/photo.hpp>
 
 #include "recon/preprocess/reflections.h"
 #include "recon/preprocess/undistort.h"
@@ -52,6 +53,27 @@ TEST(Reflections, SuppressionBringsTheWallBack) {
     EXPECT_TRUE(cv::mean(difference, mask)[0] <= 12.0) << cv::mean(difference, mask)[0];
     EXPECT_EQ(cv::countNonZero(difference & ~mask), 0);
   }
+}
+
+TEST(Reflections, PiecesArePaintedAsInTheWholePicture) {
+  const cv::Mat gray = wall();
+  cv::Mat bgr, mask = cv::Mat::zeros(gray.size(), CV_8U);
+  cv::cvtColor(gray, bgr, cv::COLOR_GRAY2BGR);
+  cv::RNG random(3);
+  for (int i = 0; i < 150; ++i)  // some touch, some lie a few pixels apart, some cross the border
+    cv::circle(mask, {random.uniform(0, kWidth), random.uniform(0, kHeight)}, random.uniform(1, 9),
+               255, cv::FILLED);
+  for (const Inpainting method : {Inpainting::telea, Inpainting::navier_stokes})
+    for (const double radius_px : {3.0, 8.0})
+      for (const cv::Mat& picture : {gray, bgr}) {
+        ReflectionOptions options;
+        options.inpainting = method;
+        options.inpaint_radius_px = radius_px;
+        cv::Mat whole;
+        cv::inpaint(picture, mask, whole, radius_px,
+                    method == Inpainting::telea ? cv::INPAINT_TELEA : cv::INPAINT_NS);
+        EXPECT_EQ(cv::norm(suppress_reflections(picture, mask, options), whole, cv::NORM_INF), 0.0);
+      }
 }
 
 TEST(Undistortion, StraightensWhatTheLensBent) {
