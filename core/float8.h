@@ -37,7 +37,12 @@ using Int8 [[gnu::vector_size(32)]] = int;
   right = __builtin_shufflevector(outer, inner, 1, 3, 9, 11, 5, 7, 13, 15);
 }
 
-/// Pairs first, so that no sum waits for seven.
+/// Of the lanes, in double; pairs first, so that no sum waits for all before it.
+inline double sum_of(Float4 v) {
+  float lane[4];
+  _mm_storeu_ps(lane, v);
+  return (static_cast<double>(lane[0]) + lane[1]) + (static_cast<double>(lane[2]) + lane[3]);
+}
 [[gnu::always_inline]] inline double sum_of(const Float8& v) {
   const auto two = [&v](int i) { return static_cast<double>(v[i]) + v[i + 1]; };
   return (two(0) + two(2)) + (two(4) + two(6));

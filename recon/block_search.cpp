@@ -44,7 +44,8 @@ __m128i products(const Block& block, int side, const std::int16_t* p, int stride
 
 }  // namespace
 
-BlockSearch::BlockSearch(const cv::Mat& picture, int side, int reach) : side_(side), reach_(reach) {
+BlockSearch::BlockSearch(const cv::Mat& picture, int side, int reach)
+    : size_(picture.size()), side_(side), reach_(reach) {
   check(picture.type() == CV_8U && side > 0 && side <= kMostSide && reach >= 0 &&
             side <= picture.cols && side <= picture.rows,
         "block search: expected an 8-bit picture and blocks of 1 to {} px in it, found type {}, {} "
@@ -81,12 +82,13 @@ BlockSearch::BlockSearch(const cv::Mat& picture, int side, int reach) : side_(si
 }
 
 cv::Mat BlockSearch::operator()(const cv::Mat& other, const cv::Point& corner) const {
-  check(other.type() == CV_8U && corner.x >= 0 && corner.y >= 0 &&
-            corner.x + side_ <= mean_.cols + side_ - 1 - 2 * reach_ &&
-            corner.y + side_ <= mean_.rows + side_ - 1 - 2 * reach_ &&
-            corner.x + side_ <= other.cols && corner.y + side_ <= other.rows,
-        "block search: the block at ({}, {}) of {} px is not in both pictures", corner.x, corner.y,
-        side_);
+  check(other.type() == CV_8U && other.size() == size_,
+        "block search: expected an 8-bit picture of {} x {}, found type {}, {} x {}", size_.width,
+        size_.height, other.type(), other.cols, other.rows);
+  check(corner.x >= 0 && corner.y >= 0 && corner.x + side_ <= size_.width &&
+            corner.y + side_ <= size_.height,
+        "block search: the block of {} px at ({}, {}) leaves the picture of {} x {}", side_,
+        corner.x, corner.y, size_.width, size_.height);
   Block block{};
   int sum = 0, squares = 0;
   for (int y = 0; y < side_; ++y)

@@ -16,7 +16,7 @@ class BlockSearch {
   static constexpr int kMostSide = 24;
 
   /// CV_32F, 2 reach + 1 px wide and high: the correlation of the block of `other`, a picture of
-  /// the same size, with its top left pixel at `corner`, with the picture where that pixel has
+  /// the same size, that has its top left pixel at `corner`, with the picture where that pixel has
   /// moved by (column - reach, row - reach). Flat places and flat blocks correlate with nothing.
   cv::Mat operator()(const cv::Mat& other, const cv::Point& corner) const;
 
@@ -25,6 +25,7 @@ class BlockSearch {
     return levels_.data() + static_cast<std::ptrdiff_t>(y) * stride_ + x;
   }
 
+  cv::Size size_;  // of the picture
   int side_, reach_, stride_;
   std::vector<std::int16_t> levels_;  // less 128, the border around them
   cv::Mat mean_, inverse_deviation_;  // CV_32F, of the block-sized place at each top left pixel

@@ -8,7 +8,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/float4.h"
+#include "core/float8.h"
 
 namespace rugae {
 namespace {
@@ -69,12 +69,6 @@ struct RowSums {
     gy_gy[2] = gy_gy[2] + ugy * ugy;
   }
 };
-
-double sum_of(Float4 v) {
-  float lane[4];
-  _mm_storeu_ps(lane, v);
-  return (static_cast<double>(lane[0]) + lane[1]) + (static_cast<double>(lane[2]) + lane[3]);
-}
 
 // With j = (gx u, gx v, gx, gy u, gy v, gy): b = sum j r, a = sum j j^T.
 Sums sums_of(const RowSums& row, double v, int overlap) {

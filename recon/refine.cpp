@@ -18,12 +18,6 @@ constexpr std::size_t kLanes = 8, kHalf = kLanes / 2;
 constexpr double kMinTexture = 1e-9;  // eigenvalue of the Hessian, values in [0, 1]
 constexpr std::size_t kLists = 3;     // of a template: values, derivatives by x and by y
 
-double sum_of(Float4 v) {
-  float lane[kHalf];
-  _mm_storeu_ps(lane, v);
-  return (static_cast<double>(lane[0]) + lane[1]) + (static_cast<double>(lane[2]) + lane[3]);
-}
-
 }  // namespace
 
 // Sums over the disc, of a picture's values less their mean.
