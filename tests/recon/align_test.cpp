@@ -176,6 +176,25 @@ TEST(RefinePoint, RefusesWhatItCannotPlace) {
   EXPECT_TRUE(refine_point(reference, reference, p, p, Mat2::Identity(), {}));
 }
 
+TEST(RefinePoint, APatchCorrelatesFullyWithItself) {
+  const cv::Mat picture = draw(kWidth, kHeight, Texture(5));
+  for (const double radius_px : {3.0, 6.0, 7.0, 12.0}) {  // discs of 25, 109, 145 and 437 pixels
+    PointRefinementOptions options{.radius_px = radius_px};
+    // Sums in single precision, of values of which the middle one's level is taken off.
+    options.min_correlation = 1.0 - 1e-5;
+    const PointRefiner refiner(options);
+    for (double y = 40.3; y < kHeight - 40; y += 51.7)
+      for (double x = 40.6; x < kWidth - 40; x += 51.7) {
+        const Vec2 p(x, y);
+        const auto sought = refiner.make_template(picture, p);
+        ASSERT_TRUE(sought);
+        const auto place = refiner(*sought, picture, p, Mat2::Identity());
+        ASSERT_TRUE(place) << radius_px << ": " << p.transpose();
+        EXPECT_TRUE((*place - p).norm() <= 1e-4);
+      }
+  }
+}
+
 TEST(RefinePoint, RefusesATemplateOfAnotherRadius) {
   const cv::Mat picture = draw(kWidth, kHeight, Texture(5));
   const Vec2 p(100.5, 100.5);

@@ -59,6 +59,23 @@ INSTANTIATE_TEST_SUITE_P(
                        ::testing::Values(2.0, 6.5, 14.2, 30.0),
                        ::testing::Values(cv::BORDER_REFLECT, cv::BORDER_CONSTANT)));
 
+TEST(SmallBlur, IsAsWideAsAsked) {
+  // A Gaussian's variance and the blur's add up.
+  constexpr int kSize = 480;
+  constexpr double kOwnSigmaPx = 12.0;
+  const cv::Mat along = cv::getGaussianKernel(kSize, kOwnSigmaPx, CV_32F);
+  const cv::Mat spot = along * along.t();
+  cv::Mat blurred;
+  for (const double sigma_px : {2.0, 6.5, 9.5, 14.2, 30.0}) {
+    cv::resize(small_blur(spot, sigma_px, cv::BORDER_CONSTANT), blurred, spot.size(), 0, 0,
+               cv::INTER_LINEAR);
+    const cv::Moments m = cv::moments(blurred);
+    constexpr double kShare = 0.005;  // OpenCV cuts Gaussians off at four sigma
+    EXPECT_NEAR(m.mu20 / m.m00 - kOwnSigmaPx * kOwnSigmaPx, sigma_px * sigma_px,
+                kShare * sigma_px * sigma_px);
+  }
+}
+
 TEST(MaskedBlur, OfAConstantIsTheConstantWhereItIsKnown) {
   cv::Mat known(cv::Size(160, 120), CV_8U, cv::Scalar(255)), values(known.size(), CV_32F);
   known(cv::Rect(40, 30, 50, 20)).setTo(0);
