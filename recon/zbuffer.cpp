@@ -136,12 +136,14 @@ cv::Mat keyframe_depth(const TriangleMesh& map, const MovingPose& camera,
     // Part of a triangle that is not projected whole may cover anything within its cone.
     if (projected < 3) box = {Vec2(0, 0), Vec2(lens.width, lens.height)};
     const double margin = kRoundingPx + kCurvedEdgeMargin * curved * size_px;
-    // Pixels with centres in the box.
-    const int left = std::max(0.0, std::ceil(box.min().x() - margin - 0.5));
-    const int top = std::max(0.0, std::ceil(box.min().y() - margin - 0.5));
-    const int right = std::min(lens.width - 1.0, std::floor(box.max().x() + margin - 0.5));
-    const int bottom = std::min(lens.height - 1.0, std::floor(box.max().y() + margin - 0.5));
-    if (left > right || top > bottom) continue;
+    // Pixels with centres in the box, which may lie farther off than an int counts.
+    const double first_x = std::max(0.0, std::ceil(box.min().x() - margin - 0.5));
+    const double first_y = std::max(0.0, std::ceil(box.min().y() - margin - 0.5));
+    const double last_x = std::min(lens.width - 1.0, std::floor(box.max().x() + margin - 0.5));
+    const double last_y = std::min(lens.height - 1.0, std::floor(box.max().y() + margin - 0.5));
+    if (!(first_x <= last_x && first_y <= last_y)) continue;
+    const int left = static_cast<int>(first_x), right = static_cast<int>(last_x);
+    const int top = static_cast<int>(first_y), bottom = static_cast<int>(last_y);
     const bool everywhere = seen.half_angle_rad == kPi;
     const double seen_cosine = std::cos(seen.half_angle_rad) - kCosineRounding;
     const Facet facet(c[0]->p_cam, c[1]->p_cam - c[0]->p_cam, c[2]->p_cam - c[0]->p_cam);

@@ -323,6 +323,22 @@ TEST(KeyframeDepth, TwoLargeTrianglesThroughADistortedLens) {
     }
 }
 
+TEST(KeyframeDepth, ATriangleBesideTheEyeIsSeenNowhere) {
+  // Its corners are projected, farther off than an int counts pixels.
+  for (const double z : {1e-3, 1e-6, 1e-8, 1e-10, 1e-12})
+    for (const double side : {1.0, -1.0}) {
+      TriangleMesh beside;
+      beside.vertices = {{side, -100, z}, {side, 100, z}, {100 * side, 0, z}};
+      beside.triangles = {{0, 1, 2}};
+      TriangleMesh above = beside;
+      for (Vec3& vertex : above.vertices) std::swap(vertex.x(), vertex.y());
+      for (const TriangleMesh& wall : {beside, above}) {
+        const cv::Mat depth = keyframe_depth(wall, Rigid3(), test_lens());
+        EXPECT_EQ(cv::countNonZero(depth == depth), 0) << z << " " << side;
+      }
+    }
+}
+
 TEST(KeyframeDepth, TheNearerWallHidesTheFartherAndNothingIsUnknown) {
   const Lens lens = test_lens();
   TriangleMesh walls;
