@@ -1,7 +1,7 @@
 #pragma once
 // Four numbers at once, SSE2: what every x86-64 has, so that no result depends on the processor.
-// Where wider registers pay, a function is compiled for AVX2 as well (gnu::target_clones), which the
-// program chooses as it starts: the same operations, for fused multiply-add is not part of AVX2.
+// Where wider registers pay, a function is compiled for AVX2 as well (gnu::target_clones), chosen
+// as the program starts: the same operations, for fused multiply-add is not part of AVX2.
 // Float4x3 are three numbers of four places: a lane is a place. GCC and Clang give __m128 the
 // operators + - * /.
 
