@@ -7,8 +7,9 @@
 
 namespace rugae {
 
-/// Zero-mean normalised correlation (Lewis 1995) of square blocks with a picture (CV_8U), which
-/// goes on beyond its border in the middle grey, 128. Sums of products are of whole numbers: exact.
+/// Zero-mean normalised correlation (Lewis, Fast Normalized Cross-Correlation, Vision Interface
+/// 1995) of square blocks with a picture (CV_8U), which goes on beyond its border in the middle
+/// grey, 128. Sums of products are of whole numbers: exact.
 class BlockSearch {
  public:
   /// Blocks of `side` px, at most kMostSide, may move by `reach` px each way.

@@ -177,6 +177,7 @@ TEST(RefinePoint, RefusesWhatItCannotPlace) {
 }
 
 TEST(RefinePoint, APatchCorrelatesFullyWithItself) {
+  constexpr double kRoundingPx = 1e-4;  // of sums in single precision
   const cv::Mat picture = draw(kWidth, kHeight, Texture(5));
   for (const double radius_px : {3.0, 6.0, 7.0, 12.0}) {  // discs of 25, 109, 145 and 437 pixels
     PointRefinementOptions options{.radius_px = radius_px};
@@ -190,7 +191,7 @@ TEST(RefinePoint, APatchCorrelatesFullyWithItself) {
         ASSERT_TRUE(sought);
         const auto place = refiner(*sought, picture, p, Mat2::Identity());
         ASSERT_TRUE(place) << radius_px << ": " << p.transpose();
-        EXPECT_TRUE((*place - p).norm() <= 1e-4);
+        EXPECT_TRUE((*place - p).norm() <= kRoundingPx);
       }
   }
 }

@@ -24,7 +24,7 @@ cv::Mat picture(const Vec2& shift) {
 
 TEST(BlockSearch, IsTheCorrelationOfOpenCv) {
   const cv::Mat from = picture({0.0, 0.0}), to = picture({3.0, -2.0});
-  for (const int side : {1 + 8, 20, BlockSearch::kMostSide})
+  for (const int side : {9, 20, BlockSearch::kMostSide})
     for (const int reach : {0, 5, 20}) {
       cv::Mat wide;
       cv::copyMakeBorder(to, wide, reach, reach, reach, reach, cv::BORDER_CONSTANT,
@@ -72,6 +72,7 @@ TEST(BlockSearch, BlocksMustLieInThePictures) {
   const BlockSearch search(picture({0.0, 0.0}), 20, 10);
   EXPECT_THROW(search(picture({0.0, 0.0}), {61, 0}), Error);
   EXPECT_THROW(search(picture({0.0, 0.0}), {0, 42}), Error);
+  EXPECT_THROW(search(cv::Mat::zeros(60, 80, CV_8U), {0, 0}), Error);  // of another size
   EXPECT_THROW(BlockSearch(picture({0.0, 0.0}), BlockSearch::kMostSide + 1, 10), Error);
 }
 

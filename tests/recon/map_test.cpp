@@ -324,7 +324,7 @@ TEST(KeyframeDepth, TwoLargeTrianglesThroughADistortedLens) {
 }
 
 TEST(KeyframeDepth, ATriangleBesideTheEyeIsSeenNowhere) {
-  // Its corners are projected, farther off than an int counts pixels.
+  // In front of the eye by less and less, and beyond all that the lens projects.
   for (const double z : {1e-3, 1e-6, 1e-8, 1e-10, 1e-12})
     for (const double side : {1.0, -1.0}) {
       TriangleMesh beside;
