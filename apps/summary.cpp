@@ -43,6 +43,8 @@ std::string summary_text(const json& metrics) {
                         number(aligned, "completeness_mean_mm", " mm"),
                         number(aligned, "chamfer_mean_mm", " mm"));
   }
+  if (const auto note = surface.value("note", ""); !note.empty())
+    text += fmt::format("map, not measured  {}\n", note);
   const json& time = metrics.at("time");
   return text + fmt::format("time               {}, {} frames a second, {} peak",
                             number(time, "reconstruct_s", " s"), number(time, "frames_per_s", ""),

@@ -3,6 +3,7 @@
 #include "core/check.h"
 #include "dataset/label_images.h"
 #include "dataset/ply_io.h"
+#include "dataset/writer.h"
 
 namespace rugae {
 RowPoses read_row_poses(const std::filesystem::path& file, const Camera& camera) {
@@ -38,6 +39,7 @@ Truth Truth::open(const std::filesystem::path& dataset) {
   check(std::filesystem::exists(layout.manifest()),
         "{}: the dataset was not finished (no manifest.sha256); run the simulation again",
         dataset.string());
+  truth.labels_ = read_info(layout.info()).truth.labels;
   truth.camera_ = load_camera(layout.camera().string());
   truth.track_ = read_tum(layout.trajectory());
   truth.wall_ = read_ply(layout.wall());

@@ -10,6 +10,7 @@
 #include "cameras/row_poses.h"
 #include "core/mesh.h"
 #include "core/pose_track.h"
+#include "dataset/label_images.h"
 #include "dataset/layout.h"
 #include "dataset/tracks.h"
 
@@ -56,6 +57,8 @@ class Truth {
   const PoseTrack& track() const { return track_; }
   const TriangleMesh& wall() const { return wall_; }  // at rest
   bool wall_moves() const;
+  /// Whether the dataset was made with a label (dataset/label_images.h).
+  bool has_label(const std::string& name) const { return labels_.*label_image(name).wanted; }
   /// The wall at the frame's time: without normals where it has moved.
   TriangleMesh wall(int index) const;
   /// The camera while the frame was read out.
@@ -73,6 +76,7 @@ class Truth {
 
  private:
   DatasetLayout layout_;
+  LabelSet labels_;
   Camera camera_;
   PoseTrack track_;
   TriangleMesh wall_;

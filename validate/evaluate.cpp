@@ -105,8 +105,8 @@ json frames_json(const Truth& truth, const Estimate& estimate, const PoseErrors&
           {"truth_mm", true_mm}, {"estimate_mm", aligned_mm},     {"state", state}};
 }
 
-json depth_errors(const Truth& truth, const EstimateLayout& layout, const PoseErrors& poses,
-                  Progress& progress) {
+json depth_errors(const Truth& truth, const Estimate& estimate, const EstimateLayout& layout,
+                  const PoseErrors& poses, Progress& progress) {
   struct OfFrame {
     std::optional<DepthError> metric, by_median;
   };
@@ -116,7 +116,8 @@ json depth_errors(const Truth& truth, const EstimateLayout& layout, const PoseEr
       [&](std::size_t i) {
         OfFrame errors;
         const int frame = static_cast<int>(i);
-        if (!fs::exists(layout.depth(frame))) return errors;
+        if (estimate.states[i] != FrameState::keyframe || !fs::exists(layout.depth(frame)))
+          return errors;
         const cv::Mat estimated = read_exr(layout.depth(frame)), true_mm = truth.depth_mm(frame);
         if (poses.sim3)
           errors.metric = depth_error(estimated, true_mm, poses.sim3->truth_from_estimate.scale);
@@ -152,13 +153,17 @@ json scale_json(const Estimate& estimate, const PoseErrors& poses) {
           {"error_over_sigma", std::abs(error_share) / *estimate.scale_sigma_share}};
 }
 
+json surface_not_measured(const std::string& note) {
+  return {{"trajectory_aligned", nullptr},
+          {"icp_aligned", nullptr},
+          {"icp_scaled", nullptr},
+          {"icp", nullptr},
+          {"note", note}};
+}
+
 // The map against the wall that was seen: placed by the trajectory, then by ICP from there.
 json surface_errors(const Estimate& estimate, const TriangleMesh& seen, const PoseErrors& poses) {
-  json out = {{"trajectory_aligned", nullptr},
-              {"icp_aligned", nullptr},
-              {"icp_scaled", nullptr},
-              {"icp", nullptr},
-              {"note", ""}};
+  json out = surface_not_measured("");
   if (estimate.map.empty()) out["note"] = "the estimate has no map";
   if (!poses.sim3) out["note"] = "the map cannot be placed: " + poses.note;
   if (seen.empty()) out["note"] = "no part of the wall was seen";
@@ -207,8 +212,18 @@ json evaluate(const fs::path& dataset, const fs::path& estimate_folder, Progress
   out["frames"] = frames_json(truth, estimate, poses);
   progress.end();
 
+  out["time"] = time_json(estimate);
+  out["reconstruction"] = estimate.numbers;
+  if (!truth.has_label("depth")) {  // the path alone
+    const std::string note = "the dataset was made without depth";
+    out["depth"] = {{"sim3", nullptr}, {"median_scaled", nullptr}, {"note", note}};
+    out["coverage"] = nullptr;
+    out["surface"] = surface_not_measured(note);
+    return out;
+  }
+
   progress.begin("evaluate: depth", truth.size());
-  out["depth"] = depth_errors(truth, EstimateLayout{estimate_folder}, poses, progress);
+  out["depth"] = depth_errors(truth, estimate, EstimateLayout{estimate_folder}, poses, progress);
   progress.end();
 
   progress.begin("evaluate: wall seen", truth.size());
@@ -221,9 +236,6 @@ json evaluate(const fs::path& dataset, const fs::path& estimate_folder, Progress
   progress.begin("evaluate: surface");
   out["surface"] = surface_errors(estimate, visibility.seen_wall(), poses);
   progress.end();
-
-  out["time"] = time_json(estimate);
-  out["reconstruction"] = estimate.numbers;
   return out;
 }
 

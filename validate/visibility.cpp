@@ -43,30 +43,45 @@ Visibility::Visibility(const TriangleMesh& wall, const VisibilityOptions& option
       seen_(wall.triangles.size(), 0),
       seen_well_(wall.triangles.size(), 0) {
   options_.check();
-  centres_.reserve(wall.triangles.size());
-  normals_.reserve(wall.triangles.size());
-  for (std::size_t t = 0; t < wall.triangles.size(); ++t) {
-    const Vec3i& i = wall.triangles[t];
-    centres_.push_back((wall.vertices[i[0]] + wall.vertices[i[1]] + wall.vertices[i[2]]) / 3.0);
-    normals_.push_back(triangle_normal(wall, t));
-  }
+  at_rest_.reserve(wall.triangles.size());
+  for (std::size_t t = 0; t < wall.triangles.size(); ++t) at_rest_.push_back(patch_of(wall, t));
 }
 
-void Visibility::add(const Lens& lens, const Rigid3& world_from_camera, const cv::Mat& depth_mm) {
+Visibility::Patch Visibility::patch_of(const TriangleMesh& wall, std::size_t t) {
+  const Vec3i& i = wall.triangles[t];
+  return {(wall.vertices[i[0]] + wall.vertices[i[1]] + wall.vertices[i[2]]) / 3.0,
+          triangle_normal(wall, t)};
+}
+
+// Calls see(t) for each triangle that this frame sees: of different triangles at the same time.
+template <typename PatchAt, typename See>
+void Visibility::look(const Lens& lens, const RowPoses& camera, const cv::Mat& depth_mm,
+                      PatchAt patch_at, See see) {
   check(depth_mm.type() == CV_32F && depth_mm.cols == lens.width && depth_mm.rows == lens.height,
         "depth image is {}x{}, the lens {}x{}", depth_mm.cols, depth_mm.rows, lens.width,
         lens.height);
-  const Rigid3 cam_from_world = world_from_camera.inverse();
   const LensProjector projector(lens);
-  const Mat3 rotation = cam_from_world.rotation.toRotationMatrix();
+  const double middle = 0.5 * lens.height;
+  const Rigid3 whole = camera.at(middle).inverse();  // of all rows of a global shutter
   const double cos_limit = std::cos(options_.max_incidence_rad);
   // Each triangle writes its own counters: the result does not depend on threads.
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, centres_.size(), 4096),
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, seen_.size(), 4096),
                     [&](const tbb::blocked_range<std::size_t>& range) {
+                      Rigid3 cam_from_world = whole;
+                      Mat3 rotation = whole.rotation.toRotationMatrix();
                       for (std::size_t t = range.begin(); t < range.end(); ++t) {
-                        const Vec3 p_cam = rotation * centres_[t] + cam_from_world.translation;
+                        const Patch patch = patch_at(t);
+                        std::optional<Vec2> pixel;
+                        if (camera.rolling()) {
+                          pixel = camera.landing(
+                              projector, [&](double) { return patch.centre; }, middle);
+                          if (!pixel) continue;
+                          cam_from_world = camera.at(pixel->y()).inverse();
+                          rotation = cam_from_world.rotation.toRotationMatrix();
+                        }
+                        const Vec3 p_cam = rotation * patch.centre + cam_from_world.translation;
                         if (!(p_cam.z() > 0.0)) continue;
-                        const std::optional<Vec2> pixel = projector.project(p_cam);
+                        if (!camera.rolling()) pixel = projector.project(p_cam);
                         if (!pixel || !lens.contains(*pixel)) continue;
                         const float depth = depth_around(depth_mm, *pixel);
                         const double limit =
@@ -74,10 +89,41 @@ void Visibility::add(const Lens& lens, const Rigid3& world_from_camera, const cv
                         if (!(p_cam.z() <= limit)) continue;  // hidden, or nothing was hit there
                         ++seen_[t];
                         const double cos_incidence =
-                            std::abs((rotation * normals_[t]).dot(p_cam)) / p_cam.norm();
+                            std::abs((rotation * patch.normal).dot(p_cam)) / p_cam.norm();
                         if (cos_incidence >= cos_limit) ++seen_well_[t];
+                        see(t);
                       }
                     });
+}
+
+void Visibility::add(const Lens& lens, const RowPoses& camera, const cv::Mat& depth_mm) {
+  look(
+      lens, camera, depth_mm, [&](std::size_t t) { return at_rest_[t]; }, [](std::size_t) {});
+}
+
+void Visibility::add(const Lens& lens, const RowPoses& camera, const cv::Mat& depth_mm,
+                     const TriangleMesh& moved) {
+  check(moved.vertices.size() == wall_.vertices.size() &&
+            moved.triangles.size() == wall_.triangles.size(),
+        "the wall has {} vertices and {} triangles, the moved one {} and {}", wall_.vertices.size(),
+        wall_.triangles.size(), moved.vertices.size(), moved.triangles.size());
+  std::vector<char> seen_now(seen_.size(), 0);
+  look(
+      lens, camera, depth_mm, [&](std::size_t t) { return patch_of(moved, t); },
+      [&](std::size_t t) { seen_now[t] = 1; });
+  times_.resize(wall_.vertices.size(), 0);
+  displacement_mm_.resize(wall_.vertices.size(), Vec3::Zero());
+  std::vector<char> counted(wall_.vertices.size(), 0);
+  for (std::size_t t = 0; t < seen_now.size(); ++t) {
+    if (!seen_now[t]) continue;
+    for (const int corner : wall_.triangles[t]) {
+      const auto v = static_cast<std::size_t>(corner);
+      if (counted[v]) continue;
+      counted[v] = 1;
+      ++times_[v];
+      displacement_mm_[v] += moved.vertices[v] - wall_.vertices[v];
+    }
+  }
 }
 
 double Visibility::wall_area_mm2() const { return area_mm2(wall_); }
@@ -94,6 +140,10 @@ TriangleMesh Visibility::seen_wall() const {
   seen.triangles.clear();
   for (std::size_t t = 0; t < seen_.size(); ++t)
     if (seen_[t] > 0) seen.triangles.push_back(wall_.triangles[t]);
+  if (times_.empty()) return seen;
+  seen.normals.clear();  // were those at rest
+  for (std::size_t v = 0; v < times_.size(); ++v)
+    if (times_[v] > 0) seen.vertices[v] += displacement_mm_[v] / times_[v];
   return seen;
 }
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "cameras/camera.h"
+#include "cameras/row_poses.h"
 #include "core/mesh.h"
-#include "core/rigid3.h"
 
 namespace rugae {
 
@@ -26,8 +26,12 @@ class Visibility {
  public:
   Visibility(const TriangleMesh& wall, const VisibilityOptions& options);  // keeps a reference
 
-  /// `depth_mm` is z-depth, CV_32F, of the lens' size, NaN where nothing was hit.
-  void add(const Lens& lens, const Rigid3& world_from_camera, const cv::Mat& depth_mm);
+  /// A frame of the wall at rest. `depth_mm` is z-depth, CV_32F, of the lens' size, NaN where
+  /// nothing was hit; of a rolling shutter each row's along its own optical axis.
+  void add(const Lens& lens, const RowPoses& camera, const cv::Mat& depth_mm);
+  /// A frame of the wall where it has moved to: of the same triangles, its vertices elsewhere.
+  void add(const Lens& lens, const RowPoses& camera, const cv::Mat& depth_mm,
+           const TriangleMesh& moved);
 
   /// Frames that saw each triangle; and saw it below the incidence of the options.
   const std::vector<std::uint32_t>& seen() const { return seen_; }
@@ -36,14 +40,28 @@ class Visibility {
   double wall_area_mm2() const;
   /// Area seen in at least `times` frames below the incidence of the options.
   double covered_area_mm2(std::uint32_t times) const;
-  /// The triangles seen at least once at any incidence; all vertices are kept.
+  /// The triangles seen at least once at any incidence; all vertices are kept. Of a wall that
+  /// moves, where it was while it was seen: each vertex at its mean place over the frames that saw
+  /// a triangle of it.
   TriangleMesh seen_wall() const;
 
  private:
+  struct Patch {
+    Vec3 centre, normal;
+  };
+  static Patch patch_of(const TriangleMesh& wall, std::size_t t);
+  template <typename PatchAt, typename See>
+  void look(const Lens& lens, const RowPoses& camera, const cv::Mat& depth_mm, PatchAt patch_at,
+            See see);
+
   const TriangleMesh& wall_;
   VisibilityOptions options_;
-  std::vector<Vec3> centres_, normals_;
+  std::vector<Patch> at_rest_;  // of each triangle
   std::vector<std::uint32_t> seen_, seen_well_;
+  // Of a wall that moves, else empty: of each vertex how many frames saw it, and how far from its
+  // place at rest, added up.
+  std::vector<std::uint32_t> times_;
+  std::vector<Vec3> displacement_mm_;
 };
 
 }  // namespace rugae

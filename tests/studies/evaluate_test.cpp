@@ -74,6 +74,31 @@ TEST_F(Evaluate, AMapOneMillimetreTooLargeIsOneMillimetreOff) {
   EXPECT_EQ(surface.at("recall_at_2mm"), 1.0);
 }
 
+// Without depth nobody knows what was seen of the wall; the path is measured all the same.
+TEST_F(Evaluate, ADatasetWithoutDepthHasItsPathMeasured) {
+  const json whole = metrics(0.05);
+  inside_sphere::write_dataset(folder_ / "bare", false);
+  Progress progress(Progress::Output::silent);
+  const json bare = evaluate(folder_ / "bare", folder_ / "estimate", progress);
+  EXPECT_EQ(bare.at("trajectory"), whole.at("trajectory"));
+  EXPECT_EQ(bare.at("tracking"), whole.at("tracking"));
+  EXPECT_EQ(bare.at("time"), whole.at("time"));
+  EXPECT_TRUE(bare.at("depth").at("sim3").is_null());
+  EXPECT_TRUE(bare.at("coverage").is_null());
+  EXPECT_TRUE(bare.at("surface").at("trajectory_aligned").is_null());
+  EXPECT_EQ(bare.at("surface").at("note"), "the dataset was made without depth");
+}
+
+// A file that an earlier estimate of other key frames left is not this one's.
+TEST_F(Evaluate, DepthIsThatOfKeyFrames) {
+  const json before = metrics(0.05);
+  write_exr(EstimateLayout{folder_ / "estimate"}.depth(1),
+            cv::Mat(inside_sphere::kHeight, inside_sphere::kWidth, CV_32F, cv::Scalar(1.0)));
+  Progress progress(Progress::Output::silent);
+  EXPECT_EQ(evaluate(folder_ / "data", folder_ / "estimate", progress).at("depth"),
+            before.at("depth"));
+}
+
 // Each frame by its own depth, whatever was read beside it.
 TEST_F(Evaluate, TheWallSeenIsThatOfEachFramesOwnDepth) {
   inside_sphere::write_dataset(folder_ / "data");
@@ -81,7 +106,7 @@ TEST_F(Evaluate, TheWallSeenIsThatOfEachFramesOwnDepth) {
   Visibility one_by_one(truth.wall(), {});
   std::vector<int> backwards;
   for (int i = truth.size() - 1; i >= 0; --i) {
-    one_by_one.add(truth.camera().lens, truth.track()[i].world_from_camera, truth.depth_mm(i));
+    one_by_one.add(truth.camera().lens, truth.row_poses(i), truth.depth_mm(i));
     backwards.push_back(i);
   }
   Progress progress(Progress::Output::silent);

@@ -75,8 +75,9 @@ inline FrameTruth labels(const Rigid3& now, const Rigid3* next) {
   return truth;
 }
 
-inline void write_dataset(const std::filesystem::path& root) {
+inline void write_dataset(const std::filesystem::path& root, bool labelled = true) {
   DatasetInfo info;
+  if (!labelled) info.truth.labels = LabelSet::none();
   info.scene = "sphere";
   info.camera = "test";
   info.trajectory = "test";
