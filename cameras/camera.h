@@ -112,7 +112,7 @@ struct Camera {
   Sensor sensor;
   std::vector<Emitter> lights = {Emitter{}};
   int frames_in_paper = 0;   // of all six trajectories together
-  double diameter_mm = 0.0;  // of the housing, bounds the clearance
+  double diameter_mm = 0.0;  // of the housing: a path keeps half of it clear at least
 };
 
 /// Radius of the aperture, mm: fx times the pixel pitch is the focal length. 0 without an f-number.

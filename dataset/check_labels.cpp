@@ -105,7 +105,11 @@ LabelCheck check_labels(const LabelSources& in, int index) {
         depth, masks, kMaskValid, "depth",
         [&](int y, int x) {
           const float z = depth.image.at<float>(y, x);
-          return std::isfinite(z) && z > 0.0f;
+          if (!std::isfinite(z)) return false;
+          if (z > 0.0f) return true;
+          // What a lens sees beyond a right angle lies at or behind the camera's plane.
+          const auto ray = in.lens.unproject(Vec2(x + 0.5, y + 0.5));
+          return ray && ray->z() <= 0.0;
         },
         result);
   if (has_normals)

@@ -41,12 +41,15 @@ std::map<int, FrameExposure> ExposureLog::read(const std::filesystem::path& root
 
 ExposureLog::ExposureLog(const std::filesystem::path& root,
                          const std::map<int, FrameExposure>& known)
-    : path_(log_of(root)), file_(std::fopen(path_.c_str(), "w")) {
+    : path_(log_of(root)) {
+  if (std::filesystem::exists(DatasetLayout{root}.frame_list())) return;
+  file_.reset(std::fopen(path_.c_str(), "w"));
   check(file_ != nullptr, "{}: cannot be written: {}", path_.string(), std::strerror(errno));
   for (const auto& [frame, exposure] : known) add(frame, exposure);
 }
 
 void ExposureLog::add(int frame, const FrameExposure& exposure) {
+  if (!file_) return;
   // Hexadecimal, so that reading gives back the same doubles.
   const auto& [used, metered] = exposure;
   const int written = std::fprintf(file_.get(), "%d,%a,%a,%a,%a;\n", frame, used.time_s, used.gain,

@@ -18,7 +18,7 @@ class ExposureLog {
   static std::map<int, FrameExposure> read(const std::filesystem::path& root);
 
   /// Starts the log anew with what is known. It has the name of a temporary file: finishing a
-  /// dataset removes it.
+  /// dataset removes it. A finished one, which has all exposures, gets none.
   ExposureLog(const std::filesystem::path& root, const std::map<int, FrameExposure>& known);
   /// Add a frame before its image is published, so that no frame is without its exposure. One
   /// thread at a time.

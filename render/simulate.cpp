@@ -47,7 +47,13 @@ Path first_part(Path path, int first) {
 int default_frames(const TrajectoryOptions& trajectory, const Camera& camera) {
   if (trajectory.board.count > 0) return trajectory.board.count;
   if (!trajectory.file.empty()) return static_cast<int>(read_tum(trajectory.file).size());
-  return frames_of_trajectory(camera, std::max(1, trajectory.paper_number));
+  const int frames = frames_of_trajectory(camera, std::max(1, trajectory.paper_number));
+  check(
+      frames >= 2,
+      "camera '{}' has frames_in_paper: {}, which leaves {} for this trajectory, expected at least "
+      "2; give their number (--frames)",
+      camera.name, camera.frames_in_paper, frames);
+  return frames;
 }
 
 // Scene and trajectory both of a board, or neither.
@@ -87,14 +93,18 @@ Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajecto
   const Camera& camera = mount.camera;
   const int frames = options.frames > 0 ? options.frames : default_frames(trajectory, camera);
   check_board(options, trajectory, scene);
-  if (scene.board) return find_board_views(trajectory, frames, camera, scene, options.seed);
+  if (scene.board)
+    return first_part(find_board_views(trajectory, frames, camera, scene, options.seed),
+                      options.first);
   // a planned path keeps clear of wherever the wall may move; a given one is only checked
   TrajectoryOptions at_rest = trajectory;
-  at_rest.clearance_mm += mount.reach_mm;
+  const double clearance_mm =
+      std::max(trajectory.clearance_mm, 0.5 * camera.diameter_mm) + mount.reach_mm;
+  at_rest.clearance_mm = clearance_mm;
   if (trajectory.file.empty()) at_rest.clearance_mm += scene.motion_reach_mm;
   const PlannedPath path = plan_path(scene.wall, at_rest, options.seed);
   PoseTrack track = sample_path(path, frames, camera.sensor.fps);
-  check_moving_clearance(scene, track, trajectory.clearance_mm + mount.reach_mm,
+  check_moving_clearance(scene, track, clearance_mm,
                          fmt::format("trajectory '{}'", trajectory.name));
   // A camera in the capsule's place keeps the path to the last bit.
   const Rigid3 capsule_from_camera = mount.capsule_from_camera;
@@ -204,6 +214,7 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
   const bool whole = options.only_frame < 0;
   std::map<int, FrameExposure> exposures = ExposureLog::read(out);
   DatasetWriter writer(out, info_of(options, path, camera, scene));
+  if (whole) writer.check_finished();
   writer.write_scene(camera, path.track, scene.wall);
   write_scene_truth(scene, writer.layout().truth());
   const ExposureControl control(camera.sensor, options.render.sensor);

@@ -59,7 +59,8 @@ std::vector<TrackPoint> choose_track_points(const FrameRenderer& renderer,
 std::vector<TrackSample> follow_tracks(const FrameRenderer& renderer, const FrameView& view,
                                        const std::vector<TrackPoint>& points) {
   const Wall& wall = renderer.wall_of(view);
-  const RayTable& rays = renderer.rays();
+  const LensProjector& lens = renderer.lens();
+  const double middle = 0.5 * renderer.rays().height;
   std::vector<TrackSample> samples;
   std::vector<Eye> eyes;
   std::vector<Vec3> places;
@@ -67,10 +68,8 @@ std::vector<TrackSample> follow_tracks(const FrameRenderer& renderer, const Fram
   for (const TrackPoint& point : points) {
     const Hit hit = as_hit(point);
     const auto at = [&](double offset_s) { return wall.point(hit, view.beat(offset_s)); };
-    const auto landing = view.camera.landing(renderer.lens(), at, 0.5 * rays.height);
-    if (!landing || !(landing->x() >= 0.0 && landing->y() >= 0.0 && landing->x() < rays.width &&
-                      landing->y() < rays.height))
-      continue;
+    const auto landing = view.camera.landing(lens, at, middle);
+    if (!landing || !lens.contains(*landing)) continue;
     const Rigid3 pose = view.camera.at(landing->y());
     const double offset_s = view.camera.offset_s(landing->y()), beat = view.beat(offset_s);
     const Vec3 place = at(offset_s);

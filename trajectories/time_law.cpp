@@ -10,7 +10,7 @@
 namespace rugae {
 
 TimeLaw::TimeLaw(const PaceOptions& pace, std::uint64_t seed) {
-  if (pace.bursts == 0) return;
+  if (pace.bursts == 0 || pace.burst_share == 0.0) return;
   // A lobe cos^2(pi x / (2 width)) over |x| < width has the area `width`, which is also its full
   // width at half height. Mean 1: base + (peak - base) share = 1.
   width_ = pace.burst_share / pace.bursts;

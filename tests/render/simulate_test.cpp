@@ -259,6 +259,60 @@ TEST_F(Simulate, OnlyFrameIsThatFrameOfTheWholeRun) {
   EXPECT_EQ(read_text(whole.flow(4)), read_text(alone.flow(4)));
   EXPECT_FALSE(fs::exists(alone.frame(3)));
   EXPECT_FALSE(fs::exists(alone.manifest()));
+  run("whole");  // of a finished dataset: nothing else is left there
+  EXPECT_EQ(check_dataset(root_ / "whole").problems, std::vector<std::string>{});
+}
+
+// The first frames are those of the whole. In the last of them the camera goes on as in the whole
+// while its rows are read, and says so; a wall that moves stands still from then on, since no file
+// says where it would be next.
+TEST_F(Simulate, TheFirstFramesAreThoseOfTheWhole) {
+  write_atomic(root_ / "scene.yaml",
+               "kind: mesh\nmesh: wall.ply\ntarget_edge_mm: 4\nwith_relief: false\n"
+               "deformation: {breathing: true, breaths_per_minute: 60}\n");
+  std::string camera = read_text(root_ / "camera.yaml");
+  const std::string global = "shutter: global";
+  camera.replace(camera.find(global), global.size(), "shutter: rolling, row_time_us: 600");
+  write_atomic(root_ / "camera.yaml", camera);
+  write_atomic(root_ / "path.yaml",
+               "like: \"4\"\nlength_cm: 10\nclearance_mm: 5\nloops: {count: 0}\n");
+  options_.frames = 8;
+  run("whole");
+  options_.first = 4;
+  run("first");
+  const DatasetLayout whole{root_ / "whole"}, first{root_ / "first"};
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_EQ(read_text(whole.row_poses(i)), read_text(first.row_poses(i))) << i;
+    EXPECT_EQ(read_text(whole.wall_motion(i)), read_text(first.wall_motion(i))) << i;
+    if (i == 3) break;
+    EXPECT_EQ(read_text(whole.frame(i)), read_text(first.frame(i))) << i;
+    EXPECT_EQ(read_text(whole.depth(i)), read_text(first.depth(i))) << i;
+  }
+  EXPECT_EQ(check_dataset(root_ / "first").problems, std::vector<std::string>{});
+}
+
+TEST_F(Simulate, TheFirstViewsOfABoard) {
+  options_.scene = options_.trajectory = "chessboard";
+  options_.first = 3;
+  EXPECT_EQ(run("board").frames, 3);
+  EXPECT_EQ(Truth::open(root_ / "board").size(), 3);
+}
+
+// What lies beside or behind the camera has a depth of 0 or less along its axis.
+TEST_F(Simulate, AFisheyeSeesBeyondARightAngle) {
+  write_atomic(root_ / "camera.yaml",
+               "name: wide\nframes_in_paper: 6\n"
+               "lens: {model: kannala_brandt, width: 64, height: 64, horizontal_fov_deg: 140}\n"
+               "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 9000, "
+               "read_noise_e: 5, shutter: global}\n");
+  options_.render.truth.labels.range = true;
+  run("wide");
+  EXPECT_EQ(check_dataset(root_ / "wide").problems, std::vector<std::string>{});
+  const Truth truth = Truth::open(root_ / "wide");
+  const cv::Mat depth = truth.depth_mm(0), range = truth.label("range", 0);
+  EXPECT_LT(depth.at<float>(0, 0), 0.0f);
+  EXPECT_GT(range.at<float>(0, 0), 0.0f);
+  EXPECT_GT(depth.at<float>(32, 32), 0.0f);
 }
 
 TEST_F(Simulate, SwitchesActAlone) {
@@ -317,6 +371,21 @@ TEST_F(Simulate, SaysWhatIsWrong) {
   options.render.lens = {.samples = 4, .defocus = true};
   EXPECT_EQ(text_of(options, root_ / "x"),
             "camera 'small' has no focus (f_number and distance_mm), which lens.defocus needs");
+  options = options_;
+  options.trajectory = "1";
+  std::string camera = read_text(root_ / "camera.yaml");
+  camera.replace(camera.find("frames_in_paper: 6"), 18, "frames_in_paper: 0");
+  write_atomic(root_ / "unnumbered.yaml", camera);
+  options.camera = (root_ / "unnumbered.yaml").string();
+  EXPECT_EQ(
+      text_of(options, root_ / "x"),
+      "camera 'small' has frames_in_paper: 0, which leaves 0 for this trajectory, expected at "
+      "least 2; give their number (--frames)");
+  options.frames = 2;  // a housing that does not fit
+  camera.replace(camera.find("diameter_mm: 4"), 14, "diameter_mm: 150");
+  write_atomic(root_ / "unnumbered.yaml", camera);
+  EXPECT_NE(text_of(options, root_ / "x").find("a clearance of 75 mm"), std::string::npos)
+      << text_of(options, root_ / "x");
   // A file stands where the folder should be.
   write_atomic(root_ / "taken", "");
   EXPECT_NE(text_of(options_, root_ / "taken").find("taken"), std::string::npos);

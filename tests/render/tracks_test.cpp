@@ -57,6 +57,31 @@ TEST(Tracks, PointsLandWhereTheyGoAndAreSeenWhereTheyAre) {
   EXPECT_GT(outside, 50);
 }
 
+// Where the stop leaves no label, no point is followed either.
+TEST(Tracks, NoneLandsUnderTheFieldStop) {
+  MovingWorld world(48, 36, 3, 0.9, 3.0);
+  world.camera.lens.stop = {StopShape::circle, 0.8};
+  const FrameRenderer renderer = world.renderer({});
+  const SceneMotion motion = world.motion(renderer);
+  const auto points = choose_track_points(renderer, motion, world.frames, 400, 7);
+  int covered = 0;
+  for (const int frame : {1, 4, 9}) {
+    std::set<int> listed;
+    for (const TrackSample& sample : follow_tracks(renderer, motion.view(frame), points)) {
+      EXPECT_TRUE(world.camera.lens.contains(sample.pixel)) << sample.pixel.transpose();
+      listed.insert(sample.point);
+    }
+    for (const TrackPoint& point : points) {
+      const Vec3f label(static_cast<float>(point.triangle), point.b1, point.b2);
+      const auto landing = world.follow(label, frame);
+      const bool in_image = landing && (landing->pixel.array() >= 0.0).all() &&
+                            landing->pixel.x() < 48.0 && landing->pixel.y() < 36.0;
+      covered += in_image && !listed.contains(point.point);
+    }
+  }
+  EXPECT_GT(covered, 50);
+}
+
 TEST(Tracks, AreDrawnBySeedOverTheSequence) {
   const MovingWorld world(32, 24, 3, 0.0);
   const FrameRenderer renderer = world.renderer({});

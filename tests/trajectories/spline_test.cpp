@@ -96,6 +96,11 @@ TEST(TimeLaw, SteadyIsTheIdentity) {
   for (double f = 0.0; f <= 1.0; f += 0.1) EXPECT_NEAR(law.share(f), f, kRound);
 }
 
+TEST(TimeLaw, BurstsOfNoLengthAreNone) {
+  const TimeLaw law({.peak_speed = 4.0, .bursts = 12, .burst_share = 0.0}, 1);
+  for (double f = 0.0; f <= 1.0; f += 0.1) EXPECT_NEAR(law.share(f), f, kRound);
+}
+
 TEST(TimeLaw, BurstsReachTheirPeakAndCoverTheWholeWay) {
   const PaceOptions pace{.peak_speed = 4.0, .bursts = 12, .burst_share = 0.15};
   const TimeLaw law(pace, 5);
