@@ -10,6 +10,7 @@
 #include "core/files.h"
 #include "core/mesh_io.h"
 #include "dataset/csv.h"
+#include "dataset/layout.h"
 #include "dataset/ply_io.h"
 
 namespace rugae {
@@ -122,6 +123,31 @@ PoseTrack Estimate::track() const {
   return track;
 }
 
+void make_estimate_folder(const fs::path& root) {
+  const DatasetLayout dataset{root};
+  const fs::path frames = dataset.frames().filename();
+  check(!fs::exists(dataset.info()) && !fs::is_directory(root / frames),
+        "{}: holds {}, expected a folder of the estimate's own", root.string(),
+        fs::exists(dataset.info()) ? "a dataset" : "frames of observations");
+  make_folder(root);
+}
+
+void discard_estimate(const fs::path& root) {
+  const EstimateLayout layout{root};
+  const bool finished = fs::exists(layout.info());
+  std::vector<fs::path> old{layout.info(), layout.map_glb(), layout.map_ply()};
+  if (fs::is_directory(layout.depth_folder()))
+    for (const auto& entry : fs::directory_iterator(layout.depth_folder()))
+      if (entry.path().extension() == ".exr") old.push_back(entry.path());
+  for (const fs::path& file : old) {
+    std::error_code failed;
+    fs::remove(file, failed);
+    check(!failed, "{}: cannot be removed: {}", file.string(), failed.message());
+  }
+  // A folder of this name in any other folder is somebody else's.
+  if (finished) fs::remove_all(layout.pictures());
+}
+
 void write_estimate(const fs::path& root, const Estimate& estimate) {
   check(estimate.states.size() == estimate.times_s.size() &&
             estimate.world_from_camera.size() == estimate.times_s.size(),
@@ -132,6 +158,7 @@ void write_estimate(const fs::path& root, const Estimate& estimate) {
   make_folder(root);
   std::error_code none_before;
   fs::remove(layout.info(), none_before);  // an estimate being rewritten is not a finished one
+  if (estimate.map.empty()) fs::remove(layout.map_glb(), none_before);
   write_atomic(layout.trajectory(), tum_text(estimate.track()));
   write_atomic(layout.frame_list(), list_text(estimate));
   write_atomic(layout.lens(), lens_yaml(estimate.lens, "the lens used by the reconstruction"));

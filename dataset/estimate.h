@@ -68,6 +68,13 @@ struct EstimateLayout {
 /// Everything but depth maps and pictures, which the pipeline writes as it goes. estimate.json is
 /// written last.
 void write_estimate(const std::filesystem::path& root, const Estimate& estimate);
+/// Makes the folder of an estimate. Throws Error for one that holds a dataset or its observations,
+/// whose files the estimate's would mix with and write over.
+void make_estimate_folder(const std::filesystem::path& root);
+/// Takes from a folder what an earlier estimate left there and the next one might not write over:
+/// estimate.json first, so that what is left is no finished estimate, the depth of its key frames,
+/// its pictures, its map.
+void discard_estimate(const std::filesystem::path& root);
 /// Map, points and trajectory included. Throws Error when estimate.json is missing ("... was not
 /// finished").
 Estimate read_estimate(const std::filesystem::path& root);

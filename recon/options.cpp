@@ -9,7 +9,6 @@
 namespace rugae {
 namespace {
 
-const std::vector<std::string> kMethods = {"paper", "dense"};
 const std::vector<std::string> kInpaintings = {"telea", "navier_stokes"};
 
 }  // namespace
@@ -69,7 +68,7 @@ void fields(Visitor& v, MosaicOptions& o) {
 template <typename Visitor>
 void fields(Visitor& v, ShadingOptions& o) {
   v.number("iterations", o.iterations, 1, 10000);
-  v.number("w_n", o.w_n, 0.0, 1.0);
+  v.number("w_n", o.w_n, 1e-12, 1.0);  // 0: the gain of a settled pixel is 0 / 0
   v.number("s_0", o.s_0, 0.0, 1000.0);
 }
 
@@ -94,7 +93,7 @@ void fields(Visitor& v, DenseOptions& o) {
   v.number("window_radius_px", o.window_radius_px, 1, 20);
   v.number("min_score", o.min_score, 0.0, 1.0);
   v.number("max_sigma_share", o.max_sigma_share, 1e-6, 1.0);
-  v.number("consistent_maps", o.consistent_maps, 0, 100);
+  v.number("consistent_maps", o.consistent_maps, 0, kComparedMaps);
   v.number("consistent_sigmas", o.consistent_sigmas, 0.1, 100.0);
   v.number("gap_sigma_share", o.gap_sigma_share, 0.0, 1.0);
   v.number("voxel_px", o.voxel_px, 0.5, 100.0);

@@ -84,6 +84,8 @@ struct RevisitOptions {
 };
 
 /// Of `dense`: its map.
+inline constexpr int kComparedMaps = 12;  // other depth maps that each is held against
+
 struct DenseOptions {
   int width_px = 400;              // of a depth map, at most; it shows all that the lens sees
   int max_depth_maps = 200;        // key frames that get one; bounds time and memory
@@ -100,6 +102,8 @@ struct DenseOptions {
   double voxel_px = 4.0;  // side of a voxel, in the wall's width of a depth map's pixel
   void check() const;
 };
+
+inline const std::vector<std::string> kMethods = {"paper", "dense"};
 
 struct ReconOptions {
   std::string method = "paper";

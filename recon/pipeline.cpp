@@ -36,7 +36,7 @@ std::vector<std::optional<MosaicDepth>> place_all(const std::vector<Mosaic>& mos
   return depths;
 }
 
-// `motions` of the key frames.
+// `motions` of the key frames, or none.
 void write_depth(const EstimateLayout& layout, const TriangleMesh& map, const Structure& structure,
                  const std::vector<CameraMotion>& motions, const RollingShutter& shutter,
                  Progress& progress) {
@@ -48,8 +48,9 @@ void write_depth(const EstimateLayout& layout, const TriangleMesh& map, const St
   const std::vector<Vec3> rays = pixel_rays(shutter.original());
   do_in_lots(placed.size(), kAtOnce, progress, [&](std::size_t i) {
     const int k = placed[i];
+    const CameraMotion motion = motions.empty() ? CameraMotion() : motions[k];
     write_exr(layout.depth(structure.frames[k]),
-              keyframe_depth(map, {structure.cam_from_world[k], motions[k]}, shutter, rays));
+              keyframe_depth(map, {structure.cam_from_world[k], motion}, shutter, rays));
   });
   progress.end();
 }
@@ -94,12 +95,12 @@ Estimate estimate_of(const Observations& observations, const ReconOptions& optio
 }  // namespace
 
 MadeMap make_map(const FrameSource& frames, const Structure& structure,
-                 const std::vector<PairAlignment>& pairs, const ReconOptions& options,
-                 const Stages& stages, Progress& progress) {
+                 const std::vector<CameraMotion>& motions, const std::vector<PairAlignment>& pairs,
+                 const ReconOptions& options, const Stages& stages, Progress& progress) {
   MadeMap made;
   if (options.method == "dense") {
-    DenseMap map = build_dense_map(frames, structure, options.preprocess.reflections, options.dense,
-                                   options.pictures ? kPictures : 0, progress);
+    DenseMap map = build_dense_map(frames, structure, motions, options.preprocess.reflections,
+                                   options.dense, options.pictures ? kPictures : 0, progress);
     made.mesh = std::move(map.mesh);
     made.examples = std::move(map.examples);
     made.numbers = {{"depth_maps", map.depth_maps},
@@ -119,20 +120,21 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
                    const std::filesystem::path& out, const Stages& stages, Progress& progress,
                    Listener* listener) {
   const EstimateLayout layout{out};
-  make_folder(out);
+  make_estimate_folder(out);
   progress.end();
   frames.release();
   const auto earlier = static_cast<std::ptrdiff_t>(progress.stages().size());  // of the caller
   const Structure& structure = motion.structure;
 
   Estimate estimate = estimate_of(frames.observations(), options, motion);
-  MadeMap made = make_map(frames, structure, motion.pairs, options, stages, progress);
+  // The paper's method takes every shutter for a global one.
+  const bool rolling = options.method == "dense" && frames.shutter().rolling();
+  const std::vector<CameraMotion> motions =
+      rolling ? keyframe_motions(frames, structure) : std::vector<CameraMotion>();
+  MadeMap made = make_map(frames, structure, motions, motion.pairs, options, stages, progress);
   estimate.map = std::move(made.mesh);
   estimate.numbers.insert(made.numbers.begin(), made.numbers.end());
-  // The paper's method takes every shutter for a global one.
-  const std::vector<CameraMotion> motions =
-      options.method == "dense" ? keyframe_motions(frames, structure)
-                                : std::vector<CameraMotion>(structure.frames.size());
+  discard_estimate(out);
   write_depth(layout, estimate.map, structure, motions, frames.shutter(), progress);
   if (options.pictures) {
     progress.begin("pictures");
@@ -162,7 +164,7 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
 
 Estimate reconstruct(const Observations& observations, const ReconOptions& options,
                      const std::filesystem::path& out, Progress& progress) {
-  make_folder(out);
+  make_estimate_folder(out);
   Reconstruction reconstruction(observations, options);
   progress.begin("frames", static_cast<std::size_t>(observations.size()));
   while (reconstruction.size() < observations.size()) {

@@ -33,10 +33,10 @@ struct MadeMap {
   std::vector<std::optional<MosaicDepth>> depths;  // of each
 };
 
-/// `pairs` of neighbouring key frames.
+/// `pairs` of neighbouring key frames; `motions` as in build_dense_map().
 MadeMap make_map(const FrameSource& frames, const Structure& structure,
-                 const std::vector<PairAlignment>& pairs, const ReconOptions& options,
-                 const Stages& stages, Progress& progress);
+                 const std::vector<CameraMotion>& motions, const std::vector<PairAlignment>& pairs,
+                 const ReconOptions& options, const Stages& stages, Progress& progress);
 
 /// The second half alone, with a motion from estimate_motion(), perhaps of an earlier run: mosaics,
 /// shape from shading, map, depth and pictures, which go to the listener as well. `frames` are

@@ -12,18 +12,22 @@ namespace {
 // A listener hears of progress as long as this lives.
 class Watched {
  public:
-  Watched(Progress& progress, Listener* listener) : progress_(progress) {
-    if (listener == nullptr) return;
+  Watched(Progress& progress, Listener* listener)
+      : progress_(progress), watches_(listener != nullptr) {
+    if (!watches_) return;
     progress.watch([listener](const std::string& stage, std::size_t done, std::size_t total) {
       listener->progress(stage, done, total);
     });
   }
-  ~Watched() { progress_.watch({}); }
+  ~Watched() {
+    if (watches_) progress_.watch({});
+  }
   Watched(const Watched&) = delete;
   Watched& operator=(const Watched&) = delete;
 
  private:
   Progress& progress_;
+  bool watches_;
 };
 
 }  // namespace
@@ -83,10 +87,10 @@ void Reconstruction::catch_up() {
 
 // The last key frame is not shown yet: nothing was followed from it, and more may lead into it.
 void Reconstruction::show_what_was_followed() {
-  if (listener_ == nullptr) return;
   const TrackChain& chain = follower_->tracks().chain();
   const std::vector<int> settled = follower_->tracks().settled();
   for (; shown_ + 1 < settled.size(); ++shown_) {
+    if (listener_ == nullptr) continue;
     const int frame = settled[shown_];
     std::vector<FollowedPoint> points;
     for (const int t : chain.through(frame)) {
@@ -122,11 +126,15 @@ TriangleMesh Reconstruction::map() {
   if (structure.placed_count() == 0) return {};
   remove_outliers(structure);
   Progress quiet(Progress::Output::silent);
-  return make_map(*frames_, structure, follower_->tracks().pairs(), options_, Stages(), quiet).mesh;
+  // These poses take every shutter for a global one.
+  return make_map(*frames_, structure, {}, follower_->tracks().pairs(), options_, Stages(), quiet)
+      .mesh;
 }
 
 Estimate Reconstruction::finish(const std::filesystem::path& out, Progress& progress) {
   check_open();
+  check(!recorded_ || added_ == frames_->size(), "{}: {} of {} frames were added before the end",
+        frames_->observations().name(), added_, frames_->size());
   progress.end();  // the caller's loop over frames: its parts have times of their own
   catch_up();
   Followed followed = follower_->finish();
@@ -141,7 +149,7 @@ Estimate Reconstruction::finish(const std::filesystem::path& out, Progress& prog
     frames_ = std::make_unique<FrameSource>(frames_->observations(), options_.preprocess);
   }
   Motion motion = solve_motion(*frames_, std::move(followed), options_, stages, progress);
-  motion.stages = {preprocessing_};
+  if (recorded_) motion.stages = {preprocessing_};
   motion.stages.insert(motion.stages.end(), following.begin(), following.end());
   motion.stages.insert(motion.stages.end(), progress.stages().begin() + earlier,
                        progress.stages().end());

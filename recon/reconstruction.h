@@ -50,7 +50,8 @@ class Reconstruction {
   TriangleMesh map();
 
   /// The estimate of the frames added, and its folder, as reconstruct() leaves it. Nothing can be
-  /// added afterwards. Throws Error for fewer than two usable frames.
+  /// added afterwards. Throws Error for fewer than two usable frames, and where recorded frames are
+  /// left.
   Estimate finish(const std::filesystem::path& out, Progress& progress);
 
  private:

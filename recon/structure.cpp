@@ -24,14 +24,17 @@ struct Segment {
   std::vector<Rigid3> cam_from_world;
   std::vector<Vec3> points;
   std::vector<char> has_point;
+  std::vector<std::vector<char>> inliers;  // of each track's observations
   int count = 0;
 };
 
 Segment taken_from(const Structure& s) {
-  Segment segment{s.placed, s.cam_from_world, {}, {}, s.placed_count()};
+  Segment segment{s.placed, s.cam_from_world, {}, {}, {}, s.placed_count()};
   for (const Track& track : s.tracks) {
     segment.points.push_back(track.point);
     segment.has_point.push_back(track.triangulated);
+    std::vector<char>& inliers = segment.inliers.emplace_back();
+    for (const auto& o : track.observations) inliers.push_back(o.inlier);
   }
   return segment;
 }
@@ -82,9 +85,11 @@ std::optional<Sim3> join(const Segment& a, const Segment& b) {
 
 // Moves segment b into a's world. cam_from_b = cam_from_a a_from_b: with X_b = S^-1 X_a the camera
 // sees s R_c (S^-1 X_a) + s t_c, the same rays.
-void merge(Segment& a, const Segment& b, const Sim3& a_from_b) {
+void merge(Segment& a, const Segment& b, const Sim3& a_from_b, const std::vector<Track>& tracks) {
+  std::vector<char> moved(b.placed.size(), 0);  // key frames
   for (std::size_t k = 0; k < b.placed.size(); ++k) {
     if (!b.placed[k] || a.placed[k]) continue;
+    moved[k] = 1;
     a.placed[k] = true;
     a.cam_from_world[k] = (a_from_b * b.cam_from_world[k].inverse()).inverse();
     ++a.count;
@@ -94,6 +99,13 @@ void merge(Segment& a, const Segment& b, const Sim3& a_from_b) {
     a.points[t] = a_from_b * b.points[t];
     a.has_point[t] = 1;
   }
+  // What b's key frames saw was judged by b's points; a's lie elsewhere, if only by a little.
+  for (std::size_t t = 0; t < tracks.size(); ++t)
+    for (std::size_t i = 0; i < tracks[t].observations.size(); ++i) {
+      const int k = tracks[t].observations[i].keyframe;
+      if (moved[static_cast<std::size_t>(k)])
+        a.inliers[t][i] = b.inliers[t][i] && (a.cam_from_world[k] * a.points[t]).z() > 0.0;
+    }
 }
 
 std::vector<Segment> grow_all(Structure& s, double focal_px, const BundleOptions& options,
@@ -118,7 +130,7 @@ std::vector<Segment> grow_all(Structure& s, double focal_px, const BundleOptions
 }
 
 // Joins what can be joined to the largest segment, which comes first.
-void join_to_largest(std::vector<Segment>& segments) {
+void join_to_largest(std::vector<Segment>& segments, const std::vector<Track>& tracks) {
   std::stable_sort(segments.begin(), segments.end(),
                    [](const Segment& a, const Segment& b) { return a.count > b.count; });
   for (bool changed = true; changed;) {
@@ -126,7 +138,7 @@ void join_to_largest(std::vector<Segment>& segments) {
     for (std::size_t i = 1; i < segments.size(); ++i) {
       const auto whole_from_other = join(segments[0], segments[i]);
       if (!whole_from_other) continue;
-      merge(segments[0], segments[i], *whole_from_other);
+      merge(segments[0], segments[i], *whole_from_other, tracks);
       segments.erase(segments.begin() + static_cast<std::ptrdiff_t>(i));
       changed = true;
       break;
@@ -142,6 +154,8 @@ Structure structure_of(const Segment& segment, const Structure& all) {
   s.cam_from_world = segment.cam_from_world;
   for (std::size_t t = 0; t < all.tracks.size(); ++t) {
     Track track = all.tracks[t];
+    for (std::size_t i = 0; i < track.observations.size(); ++i)
+      track.observations[i].inlier = segment.inliers[t][i] != 0;
     std::erase_if(track.observations, [&](const auto& o) { return !segment.placed[o.keyframe]; });
     if (track.observations.size() < 2) continue;
     track.point = segment.points[t];
@@ -243,7 +257,7 @@ std::vector<Structure> build_segments(const std::vector<int>& frames, std::vecto
     progress.end("nothing could be placed");
     return {std::move(s)};
   }
-  join_to_largest(segments);
+  join_to_largest(segments, s.tracks);
   std::vector<Structure> structures;
   for (const Segment& segment : segments) structures.push_back(structure_of(segment, s));
   progress.end(

@@ -10,12 +10,12 @@
 #include <mutex>
 #include <opencv2/core.hpp>
 
+#include "core/check.h"
 #include "core/in_lots.h"
 #include "recon/cache.h"
 #include "recon/dense/albedo.h"
 #include "recon/dense/consistency.h"
 #include "recon/dense/depth_map.h"
-#include "recon/dense/moving_keyframes.h"
 #include "recon/dense/smooth_wall.h"
 #include "recon/dense/view_choice.h"
 #include "recon/dense/volume.h"
@@ -27,7 +27,6 @@ namespace {
 
 constexpr std::size_t kAtOnce = 8;        // depth maps between two steps of the progress line
 constexpr std::size_t kCachedViews = 48;  // frames as stereo sees them: 0.7 MB each
-constexpr int kComparedMaps = 12;         // others that a depth map is held against
 /// Agreeing pixels in smaller groups than this are chance, of a depth map 400 px wide.
 constexpr double kSmallestIslandPx = 60.0;
 /// Pieces with less than this share of the triangles of the largest piece are noise.
@@ -36,9 +35,9 @@ constexpr double kSmallestPiece = 0.01;
 /// Key frames as the camera would have seen them had it stood still.
 class StillKeyframes {
  public:
-  StillKeyframes(const FrameSource& frames, const WideFrames& wide, const Structure& structure)
-      : wide_(wide), structure_(structure) {
-    if (frames.shutter().rolling()) motions_ = keyframe_motions(frames, structure);
+  StillKeyframes(const WideFrames& wide, const Structure& structure,
+                 const std::vector<CameraMotion>& motions)
+      : wide_(wide), structure_(structure), motions_(motions) {
     for (int level = 1; level < kStereoLevels; ++level) coarsest_ = halved(coarsest_);
   }
 
@@ -60,7 +59,7 @@ class StillKeyframes {
   const WideFrames& wide_;
   const Structure& structure_;
   PinholeGrid coarsest_ = wide_.grid();
-  std::vector<CameraMotion> motions_;  // empty: all rows were read at once
+  const std::vector<CameraMotion>& motions_;  // empty: all rows were read at once
 };
 
 /// Key frames as stereo sees them, the latest kept, and of all that were read the coarsest level:
@@ -197,15 +196,18 @@ TriangleMesh fuse(const StillKeyframes& frames, const std::vector<StereoSet>& se
 }  // namespace
 
 DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
+                         const std::vector<CameraMotion>& motions,
                          const ReflectionOptions& reflections, const DenseOptions& options,
                          int examples, Progress& progress) {
+  check(motions.empty() || motions.size() == structure.frames.size(),
+        "dense map: {} motions of {} key frames", motions.size(), structure.frames.size());
   reflections.check();
   options.check();
   DenseMap result;
   const std::vector<StereoSet> sets = choose_views(structure, options);
   if (sets.empty()) return result;
   const WideFrames wide(frames, reflections, options.width_px);
-  const StillKeyframes still(frames, wide, structure);
+  const StillKeyframes still(wide, structure, motions);
   Views views(still, options);
   std::vector<DepthMap> maps = depth_maps(still, sets, views, options, progress);
   progress.begin("consistency");

@@ -9,6 +9,7 @@
 #include "core/progress.h"
 #include "recon/options.h"
 #include "recon/preprocess/preprocess.h"
+#include "recon/rolling_shutter.h"
 #include "recon/structure.h"
 
 namespace rugae {
@@ -33,9 +34,12 @@ struct DenseMap {
 
 /// Depth maps of chosen key frames, their consistency, their gaps, fusion. `reflections`: how they
 /// are detected, to be left out; `examples`: how many are to be returned. Memory holds at most
-/// `max_depth_maps` small depth maps, a few frames and the surface. Empty where nothing was placed
-/// or seen from enough places; the same for any number of threads.
+/// `max_depth_maps` small depth maps, a few frames and the surface. `motions`: of the key frames
+/// while their rows were read, where the structure's poses know of that; empty: poses of all rows
+/// at once. Empty where nothing was placed or seen from enough places; the same for any number of
+/// threads.
 DenseMap build_dense_map(const FrameSource& frames, const Structure& structure,
+                         const std::vector<CameraMotion>& motions,
                          const ReflectionOptions& reflections, const DenseOptions& options,
                          int examples, Progress& progress);
 

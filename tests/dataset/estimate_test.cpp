@@ -114,6 +114,31 @@ TEST(Estimate, AnUnfinishedOneIsRefused) {
             folder.path().string() + ": the estimate was not finished (no estimate.json)");
 }
 
+TEST(Estimate, WhatAnEarlierOneLeftIsDiscarded) {
+  const TemporaryFolder folder("estimate");
+  const EstimateLayout layout{folder.path()};
+  make_folder(layout.depth_folder());
+  make_folder(layout.pictures() / "mosaic");
+  write_atomic(layout.pictures() / "mosaic" / "000000.png", "");
+  discard_estimate(folder.path());  // whose pictures these are nobody knows
+  EXPECT_TRUE(fs::exists(layout.pictures() / "mosaic" / "000000.png"));
+  write_estimate(folder.path(), example());
+  write_atomic(layout.depth(4), "");
+  write_atomic(folder.path() / "notes.txt", "");
+  discard_estimate(folder.path());
+  EXPECT_FALSE(fs::exists(layout.info()));
+  EXPECT_FALSE(fs::exists(layout.depth(4)));
+  EXPECT_FALSE(fs::exists(layout.map_ply()) || fs::exists(layout.map_glb()));
+  EXPECT_FALSE(fs::exists(layout.pictures()));
+  EXPECT_TRUE(fs::exists(folder.path() / "notes.txt"));
+
+  write_estimate(folder.path(), example());
+  Estimate without_map = example();
+  without_map.map = {};
+  write_estimate(folder.path(), without_map);
+  EXPECT_FALSE(fs::exists(layout.map_glb()));
+}
+
 TEST(Estimate, ListAndTrajectoryMustAgree) {
   const TemporaryFolder folder("estimate_disagree");
   write_estimate(folder.path(), example());

@@ -195,6 +195,8 @@ class RugaeTest(unittest.TestCase):
             live.add(camera.picture(np.zeros(3)), 0.0)
         with self.assertRaisesRegex(ValueError, "shape"):
             live.add(np.zeros((4, 4), np.uint8), 9.0)
+        with self.assertRaisesRegex(TypeError, "float32, expected uint8"):
+            live.add(np.zeros((4, 4, 3), np.float32), 9.0)
         estimate = live.finish(os.path.join(self.folder.name, "live-estimate"))
         self.assertEqual((len(estimate), estimate.states.count("lost")), (16, 0))
         with self.assertRaisesRegex(rugae.Error, "was finished"):

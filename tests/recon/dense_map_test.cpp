@@ -72,7 +72,7 @@ class DenseMapOfFrames : public ::testing::Test {
     options.max_depth_maps = 6;
     options.depth_maps_a_point = 4;
     Progress progress(Progress::Output::silent);
-    return build_dense_map(frames, structure, preprocess.reflections, options, 2, progress);
+    return build_dense_map(frames, structure, {}, preprocess.reflections, options, 2, progress);
   }
 
   static inline std::filesystem::path folder_;
@@ -123,7 +123,7 @@ TEST_F(DenseMapOfFrames, WrongPosesLeaveNextToNothing) {
 TEST_F(DenseMapOfFrames, NothingPlacedIsAnEmptyMap) {
   const FrameSource frames(Observations::open(recording_.images, recording_.calibration), {});
   Progress progress(Progress::Output::silent);
-  const DenseMap map = build_dense_map(frames, Structure{}, {}, DenseOptions{}, 2, progress);
+  const DenseMap map = build_dense_map(frames, Structure{}, {}, {}, DenseOptions{}, 2, progress);
   EXPECT_TRUE(map.mesh.empty());
   EXPECT_EQ(map.depth_maps, 0);
 }

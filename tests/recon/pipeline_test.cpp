@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <opencv2/core.hpp>
+#include <set>
 
 #include "core/check.h"
 #include "core/files.h"
@@ -121,6 +122,20 @@ TEST_F(Pipeline, TheMapIsMadeFromAMotionOnDisk) {
   in_mm.structure.scale_sigma_share = 0.0123;
   write_motion(root_ / "in_mm.cbor", in_mm);
   EXPECT_EQ(read_motion(root_ / "in_mm.cbor").structure.scale_sigma_share, 0.0123);
+
+  // Into a folder with another estimate: nothing of that one is left.
+  ReconOptions fewer = options;
+  fewer.keyframes.mean_flow_px = 40.0;
+  reconstruct(observations, fewer, root_ / "again", progress);
+  write_atomic(EstimateLayout{root_ / "again"}.depth(kFrames + 1), "");
+  build_map(frames, motion, options, root_ / "again", Stages(), progress);
+  const auto files_in = [&](const fs::path& folder) {
+    std::set<std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(folder))
+      files.insert(fs::relative(entry.path(), folder).string());
+    return files;
+  };
+  EXPECT_EQ(files_in(root_ / "again"), files_in(halves));
 
   Stages blind;
   blind.depth = [](const Mosaic&, const Structure&, const Lens&, const ReconOptions&) {

@@ -169,6 +169,30 @@ TEST(Structure, WhatCannotBeJoinedIsNotPlaced) {
   EXPECT_TRUE(path_error(s, world).rmse <= kExact * 50.0);
 }
 
+// What the first segment's growth found to be wrong stays so while others are tried.
+TEST(Structure, EachSegmentKeepsItsOutliers) {
+  World world = make_world({.cameras = 16, .outlier_share = 0.1});
+  const auto segments = [&world] {
+    Progress progress(Progress::Output::silent);
+    return build_segments(world.frames, world.tracks, world.lens, BundleOptions{}, progress);
+  };
+  const auto outliers_of = [](const Structure& s) {
+    std::size_t outliers = 0;
+    for (const Track& track : s.tracks)
+      if (track.triangulated)
+        for (const auto& o : track.observations) outliers += !o.inlier;
+    return outliers;
+  };
+  const std::size_t in_one = outliers_of(segments().front());
+  ASSERT_GT(in_one, 100u);
+  // The last four key frames see nothing in common with the others, nor enough to be a segment.
+  for (Track& track : world.tracks)
+    std::erase_if(track.observations, [](const auto& o) { return o.keyframe >= 12; });
+  const std::vector<Structure> cut = segments();
+  EXPECT_EQ(cut.front().placed_count(), 12);
+  EXPECT_GT(outliers_of(cut.front()), in_one / 2);
+}
+
 TEST(Structure, HopelessInputPlacesNothing) {
   World world = make_world({.cameras = 4});
   world.tracks.resize(5);
