@@ -112,6 +112,7 @@ void add_calibrate(CLI::App& app) {
   command.callback([a] {
     read_board(a->board, a->options);
     read_model(a->model, a->options);
+    if (a->out.has_parent_path()) make_folder(a->out.parent_path());
     std::vector<fs::path> pictures;
     for (const fs::path& input : a->inputs) {
       const auto found = pictures_in(input);

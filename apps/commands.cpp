@@ -73,6 +73,7 @@ void add_simulate(CLI::App& app) {
       render.truth.labels = LabelSet::all();
       render.truth.labels.indirect = render.light.bounces > 0;
     }
+    Progress::catch_interrupts();
     Progress progress;
     const SimulateResult r = simulate(a->options, a->out, progress);
     const int frames = r.frames + r.skipped;
@@ -126,7 +127,8 @@ void add_reconstruct(CLI::App& app) {
     options.method = a->method;
     options.check();
     const Observations observations = Observations::open(a->input, a->calibration, a->fps);
-    make_folder(a->out);
+    make_estimate_folder(a->out);
+    Progress::catch_interrupts();
     Progress progress;
     const Estimate estimate = reconstruct(observations, options, a->out, progress);
     const std::size_t tracked = estimate.track().size();
@@ -157,6 +159,8 @@ void add_evaluate(CLI::App& app) {
   command.add_option("--out", a->out, "metrics.json");
   add_json_flag(command, a->json);
   command.callback([a] {
+    if (a->out.has_parent_path()) make_folder(a->out.parent_path());
+    Progress::catch_interrupts();
     Progress progress;
     const nlohmann::json metrics = evaluate(a->dataset, a->estimate, progress);
     if (!a->out.empty()) write_atomic(a->out, metrics.dump(2) + "\n");
@@ -268,19 +272,23 @@ std::string usage_error(const CLI::App& app, int argc, char** argv, const CLI::P
   if (argc > 1 && std::ranges::count(commands, argv[1]) == 0 && argv[1][0] != '-')
     return fmt::format("'{}': no such command{}; known: {}", argv[1],
                        did_you_mean(argv[1], commands), fmt::join(commands, ", "));
+  if (argc > 1 && std::ranges::count(commands, argv[1]) == 0)
+    return fmt::format("'{}': no such option before a command; see rugae --help", argv[1]);
   if (argc < 2)
     return fmt::format("a command is missing; known: {}; see rugae --help",
                        fmt::join(commands, ", "));
   std::string text = error.what();
-  const auto* extras = dynamic_cast<const CLI::ExtrasError*>(&error);
-  if (extras && app.got_subcommand(argv[1])) {
+  // One that is required is found missing before one that is unknown, perhaps misspelt, is named.
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) ||
+      dynamic_cast<const CLI::RequiredError*>(&error)) {
     std::vector<std::string> options;
     for (const CLI::Option* option : app.get_subcommand(argv[1])->get_options())
       for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
-    for (int i = 2; i < argc; ++i)
-      if (std::string(argv[i]).starts_with("--") && std::ranges::count(options, argv[i]) == 0)
-        return fmt::format("{}: unknown option '{}'{}", argv[1], argv[i],
-                           did_you_mean(argv[i], options));
+    for (int i = 2; i < argc; ++i) {
+      const std::string word = argv[i], name = word.substr(0, word.find('='));
+      if (name.starts_with("--") && std::ranges::count(options, name) == 0)
+        return fmt::format("{}: unknown option '{}'{}", argv[1], name, did_you_mean(name, options));
+    }
   }
   return fmt::format("{}: {}; see rugae {} --help", argv[1], text, argv[1]);
 }

@@ -35,7 +35,6 @@ void keep_memory() {
 int main(int argc, char** argv) {
   keep_memory();
   FLAGS_minloglevel = google::GLOG_ERROR;  // of Ceres: a step that it tries again is no news
-  rugae::Progress::catch_interrupts();
   CLI::App app{"rugae: a capsule endoscope in a stomach, simulated, reconstructed and measured"};
   app.set_version_flag("--version", RUGAE_VERSION);
   app.require_subcommand(1);
@@ -60,7 +59,11 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return said(kBadInput, rugae::usage_error(app, argc, argv, error).c_str());
   } catch (const rugae::Interrupted& stop) {
-    return said(kInterrupted, stop.what());
+    const bool goes_on = app.got_subcommand("simulate") || app.got_subcommand("run");
+    return said(kInterrupted,
+                (std::string(stop.what()) + (goes_on ? "; the same command goes on from here"
+                                                     : "; the same command begins anew"))
+                    .c_str());
   } catch (const rugae::Error& error) {
     return said(kBadInput, error.what());
   } catch (const std::filesystem::filesystem_error& error) {

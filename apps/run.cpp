@@ -68,6 +68,7 @@ void add_run(CLI::App& app, int& exit_code) {
   command.callback([a, &exit_code] {
     const ThreadLimit limit(a->threads);
     const fs::path study = find_preset("studies", "study", a->study.string());
+    Progress::catch_interrupts();
     Progress progress;
     if (a->cell >= 0) {
       prctl(PR_SET_PDEATHSIG, SIGKILL);    // a cell does not outlive the study that started it
@@ -77,17 +78,20 @@ void add_run(CLI::App& app, int& exit_code) {
     }
     a->options.program = fs::read_symlink("/proc/self/exe");
     const StudyResult result = run_study(study, a->out, a->options, progress);
+    for (const std::string& cell : result.failed_cells)
+      std::fprintf(stderr, "cell failed: %s\n", cell.c_str());
     for (const std::string& gate : result.failed_gates)
       std::fprintf(stderr, "gate failed: %s\n", gate.c_str());
     constexpr int kNotAsAsked = 3;
-    if (!result.failed_gates.empty() || result.failed_cells > 0) exit_code = kNotAsAsked;
+    if (!result.failed_gates.empty() || !result.failed_cells.empty()) exit_code = kNotAsAsked;
     print(a->json,
           {{"cells", result.cells},
            {"failed_cells", result.failed_cells},
            {"failed_gates", result.failed_gates},
            {"report", result.report.string()}},
           fmt::format("{} cells, {} failed, {} gates failed, report: {}", result.cells,
-                      result.failed_cells, result.failed_gates.size(), result.report.string()));
+                      result.failed_cells.size(), result.failed_gates.size(),
+                      result.report.string()));
   });
 }
 

@@ -24,10 +24,20 @@ std::vector<std::string> preset_names(const std::string& kind) {
   return names;
 }
 
+bool is_path(const std::string& name_or_path) {
+  return fs::path(name_or_path).has_extension() || name_or_path.find('/') != std::string::npos;
+}
+
+std::string here_or_beside(const std::string& name_or_path, const fs::path& file) {
+  if (!is_path(name_or_path) || fs::exists(name_or_path)) return name_or_path;
+  const fs::path beside = fs::absolute(file.parent_path() / name_or_path).lexically_normal();
+  return fs::exists(beside) ? beside.string() : name_or_path;
+}
+
 fs::path find_preset(const std::string& kind, const std::string& what,
                      const std::string& name_or_path) {
   const fs::path path(name_or_path);
-  if (path.has_extension() || name_or_path.find('/') != std::string::npos) {
+  if (is_path(name_or_path)) {
     check(fs::exists(path), "{} '{}': no such file", what, name_or_path);
     return path;
   }

@@ -52,7 +52,7 @@ void Progress::begin(std::string stage, std::size_t total) {
 void Progress::step(std::size_t steps) {
   done_ += steps;
   if (watcher_) watcher_(stage_, done_, total_);
-  if (interrupted) throw Interrupted("stopped on request; the same command goes on from here");
+  if (interrupted) throw Interrupted("stopped on request");
   constexpr std::chrono::milliseconds kRedraw{100};
   if (terminal_ && !silent_ && Clock::now() - drawn_ > kRedraw) {
     drawn_ = Clock::now();

@@ -222,6 +222,23 @@ void DatasetWriter::write_track_points(const std::vector<TrackPoint>& points) co
   write_atomic(layout_.track_points(), track_points_text(points));
 }
 
+void DatasetWriter::check_finished() const {
+  if (!fs::exists(layout_.manifest())) return;
+  const auto listed = read_manifest(layout_.manifest());
+  const auto files = files_below(layout_.root, layout_.manifest().filename().string());
+  const auto hashes = hashes_of(layout_.root, files);
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const auto entry = listed.find(files[i]);
+    const std::string file = (layout_.root / files[i]).string();
+    check(entry != listed.end(), "{}: is none of this finished dataset's files; move it elsewhere",
+          file);
+    check(
+        entry->second == hashes[i],
+        "{}: changed since the dataset was finished; remove it, and the same command makes it anew",
+        file);
+  }
+}
+
 bool DatasetWriter::has_frame(int index) const {
   return std::ranges::all_of(files_of_frame(layout_, info_, index),
                              [](const fs::path& file) { return fs::exists(file); });

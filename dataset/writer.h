@@ -53,6 +53,10 @@ class DatasetWriter {
   /// is 1, now 2); choose another folder or remove it"), and for a folder with other things in it.
   DatasetWriter(const std::filesystem::path& root, const DatasetInfo& info);
 
+  /// Where the dataset was finished: throws Error naming the first file that has changed since, or
+  /// that is none of it. The manifest would call it sound when it is written again. What is missing
+  /// is no error, but a frame to be made.
+  void check_finished() const;
   /// Throws Error when the track has not one pose a frame, or when an earlier run wrote another
   /// camera, path or wall.
   void write_scene(const Camera& camera, const PoseTrack& track, const TriangleMesh& wall);

@@ -70,11 +70,13 @@ std::string camera_of(const Variant& variant, const Cell& cell, const fs::path& 
   return file.string();
 }
 
-// What a program's estimate is a function of: its arguments, and its text where it is a file.
+// What a program's estimate is a function of: its arguments, and their text where they are files,
+// such as a script behind its interpreter.
 json command_key(const ExternalMethod& method) {
-  const std::string& program = method.command[0];
-  return {{"command", method.command},
-          {"program", fs::is_regular_file(program) ? sha256_of_file(program) : std::string()}};
+  json files = json::array();
+  for (const std::string& argument : method.command)
+    files.push_back(fs::is_regular_file(argument) ? sha256_of_file(argument) : std::string());
+  return {{"command", method.command}, {"files", files}};
 }
 
 // The finished metrics are whole, since they are written so; what is asked for is one word of them.

@@ -8,7 +8,9 @@
 
 namespace rugae {
 
-/// One test suite named `title`, a test case a gate; a gate that failed has its line as failure.
-std::string junit_xml(const std::string& title, const std::vector<GateOutcome>& gates);
+/// One test suite named `title`: a test case a cell, which fails with the reason why the cell has
+/// no metrics, and one a gate; a gate that failed has its line as failure.
+std::string junit_xml(const std::string& title, const std::vector<CellResult>& cells,
+                      const std::vector<GateOutcome>& gates);
 
 }  // namespace rugae

@@ -19,11 +19,11 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 json simulation_json(const SimulateResult& r) {
-  return {{"frames", r.frames},
+  return {{"frames", r.frames + r.skipped},
           {"path_length_mm", r.path_length_mm},
           {"min_clearance_mm", r.min_clearance_mm},
           {"seconds", r.wall_s},
-          {"frames_per_s", r.wall_s > 0.0 ? json((r.frames - r.skipped) / r.wall_s) : json()},
+          {"frames_per_s", r.wall_s > 0.0 ? json(r.frames / r.wall_s) : json()},
           {"trace_thread_s", r.trace_s},
           {"shade_thread_s", r.shade_s},
           {"label_thread_s", r.label_s},
@@ -47,6 +47,24 @@ void make_dataset(const Variant& variant, const Cell& cell, const CellFiles& fil
   make_folder(dataset.parent_path());
   const json measured = simulation_json(simulate(options, dataset, progress));
   write_atomic(simulation_of(dataset), measured.dump(2) + "\n");
+}
+
+// The reason when this stomach has no room for this path, or the like. What goes wrong later, when
+// files are written, is not this cell's fault alone.
+std::optional<std::string> make_datasets(const Variant& variant, const Cell& cell,
+                                         const CellFiles& files, Progress& progress) {
+  try {
+    make_dataset(variant, cell, files, files.dataset, progress);
+    if (files.frames != files.dataset)
+      make_dataset(with_clean_frames(variant), cell, files, files.frames, progress);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    if (fs::exists(DatasetLayout{files.dataset}.info())) throw;
+    progress.end("gave up");
+    return error.what();
+  }
+  return std::nullopt;
 }
 
 // The motion of an earlier run, or of a cell whose map is made otherwise.
@@ -140,9 +158,10 @@ void write_metrics(const CellFiles& files, json metrics) {
 void make_cell(const StudyOptions& study, const Cell& cell, const CellFiles& files,
                Progress& progress) {
   const Variant& variant = study.variants[static_cast<std::size_t>(cell.variant)];
-  make_dataset(variant, cell, files, files.dataset, progress);
-  if (files.frames != files.dataset)
-    make_dataset(with_clean_frames(variant), cell, files, files.frames, progress);
+  if (const auto gave_up = make_datasets(variant, cell, files, progress)) {
+    write_failure(files, *gave_up, true);
+    return;
+  }
   if (study.measure != Measure::loop) {
     write_metrics(files, measured(study, variant, cell, files, progress));
     return;

@@ -184,7 +184,7 @@ class Workers {
     if (WIFEXITED(ended.status)) {
       const int code = WEXITSTATUS(ended.status);
       const std::string said = without_name(last_line_of(log_of(*r.job)));
-      if (code == kStopped) throw Interrupted(said);
+      if (code == kStopped) throw Interrupted("stopped on request");
       if (code == kBadInput) fail("{}", said);
     }
     write_failure(

@@ -61,8 +61,11 @@ StudyResult run_study(const fs::path& study_file, const fs::path& out, const Run
   write_atomic(out / "table.csv", table_csv(all_cells(parts)));
   const bool seeds = std::ranges::any_of(parts, [](const auto& p) { return p.has_seeds(); });
   if (seeds) write_atomic(out / "repeats.csv", repeats_csv(all_cells(parts)));
+  // Those of an earlier run that asked for others.
+  fs::remove_all(out / "tables");
+  if (!seeds) fs::remove(out / "repeats.csv");
   for (const StudyPart& part : parts) write_tables(out / "tables", part);
-  write_atomic(out / "junit.xml", junit_xml(study.title, all_gates(parts)));
+  write_atomic(out / "junit.xml", junit_xml(study.title, all_cells(parts), all_gates(parts)));
   StudyResult result;
   result.report = out / "report.html";
   write_atomic(result.report, report_html(study, parts, progress));
@@ -71,7 +74,9 @@ StudyResult run_study(const fs::path& study_file, const fs::path& out, const Run
   for (const StudyPart& part : parts)
     for (const CellResult& cell : part.cells) {
       ++result.cells;
-      result.failed_cells += cell.metrics.contains("failed");
+      if (cell.metrics.contains("failed"))
+        result.failed_cells.push_back(
+            fmt::format("{}: {}", cell.cell.title(), cell.metrics["failed"].get<std::string>()));
     }
   for (const GateOutcome& gate : all_gates(parts))
     if (!gate.passed) result.failed_gates.push_back(gate.line());

@@ -12,7 +12,8 @@
 namespace rugae {
 
 struct StudyResult {
-  int cells = 0, failed_cells = 0;
+  int cells = 0;
+  std::vector<std::string> failed_cells;  // one line each, with the reason
   std::vector<std::string> failed_gates;  // one line each, with the gate's reason
   std::filesystem::path report;
 };

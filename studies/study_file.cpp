@@ -31,7 +31,14 @@ void read_where(YamlReader& gate, const std::vector<Axis>& axes, std::vector<Set
   }
 }
 
-Gate read_gate(YamlReader yaml, const std::vector<Axis>& axes) {
+void check_known(const YamlReader& yaml, const std::string& key,
+                 const std::vector<std::string>& named, const std::vector<std::string>& known) {
+  for (const std::string& name : named)
+    check(std::ranges::count(known, name) > 0, "{}: {} is '{}', expected one of the study's: {}{}",
+          yaml.where(key), key, name, fmt::join(known, ", "), did_you_mean(name, known));
+}
+
+Gate read_gate(YamlReader yaml, const StudyOptions& study, const std::vector<Axis>& axes) {
   Gate gate;
   yaml.require("metric", gate.metric);
   yaml.require("reason", gate.reason);
@@ -45,9 +52,15 @@ Gate read_gate(YamlReader yaml, const std::vector<Axis>& axes) {
   bound("below", gate.below);
   check(gate.above || gate.below || !yaml.has("metric"),
         "{}: gate on {} has no bound, expected above or below", yaml.where("metric"), gate.metric);
+  check(!gate.above || !gate.below || *gate.above < *gate.below,
+        "{}: gate on {} is above {} and below {}, which no number is", yaml.where("above"),
+        gate.metric, *gate.above, *gate.below);
   yaml.get("camera", gate.camera);
   yaml.get("trajectory", gate.trajectory);
   yaml.get("method", gate.method);
+  check_known(yaml, "camera", gate.camera, study.cameras);
+  check_known(yaml, "trajectory", gate.trajectory, study.trajectories);
+  check_known(yaml, "method", gate.method, study.methods);
   read_where(yaml, axes, gate.settings);
   yaml.finish();
   return gate;
@@ -55,10 +68,11 @@ Gate read_gate(YamlReader yaml, const std::vector<Axis>& axes) {
 
 // The names must be there, at least one of them, and name something that exists.
 void read_names(YamlReader& yaml, const std::string& key, const std::string& what,
-                std::vector<std::string>& names) {
+                const std::string& study_file, std::vector<std::string>& names) {
   yaml.require(key, names);
   check(!names.empty(), "{}: {} is empty, expected at least one", yaml.where(key), key);
-  for (const std::string& name : names) {
+  for (std::string& name : names) {
+    name = here_or_beside(name, study_file);
     try {
       find_preset(key, what, name);
     } catch (const Error& error) {
@@ -78,7 +92,18 @@ void read_seeds(YamlReader& yaml, std::vector<std::uint64_t>& seeds) {
           seed);
 }
 
-// A program given by a path is looked for beside the study file, then under the presets' root.
+// A file given by a path, program or script, is looked for beside the study file, then under the
+// presets' root; what is found in neither is left as it is.
+void find_beside(std::string& word, const std::filesystem::path& study_file) {
+  if (word.find('/') == std::string::npos) return;
+  for (const std::filesystem::path& folder : {study_file.parent_path(), preset_root()}) {
+    const auto beside = std::filesystem::absolute(folder / word);
+    if (!std::filesystem::exists(beside)) continue;
+    word = beside.lexically_normal().string();
+    return;
+  }
+}
+
 std::vector<ExternalMethod> read_commands(YamlReader& study, const std::string& study_file) {
   std::vector<ExternalMethod> commands;
   auto yaml = study.child("commands");
@@ -87,15 +112,10 @@ std::vector<ExternalMethod> read_commands(YamlReader& study, const std::string& 
     ExternalMethod method{name, {}};
     yaml->get(name, method.command);
     method.check(yaml->where(name));
-    std::string& program = method.command[0];
-    if (program.find('/') != std::string::npos)
-      for (const std::filesystem::path& folder :
-           {std::filesystem::path(study_file).parent_path(), preset_root()}) {
-        const auto beside = std::filesystem::absolute(folder / program);
-        if (!std::filesystem::exists(beside)) continue;
-        program = beside.lexically_normal().string();
-        break;
-      }
+    check(std::ranges::count(kMethods, name) == 0 && name.find('/') == std::string::npos,
+          "{}: a command is named '{}', expected a name without '/' other than {}",
+          yaml->where(name), name, fmt::join(kMethods, " and "));
+    for (std::string& word : method.command) find_beside(word, study_file);
     commands.push_back(std::move(method));
   }
   return commands;
@@ -192,15 +212,16 @@ StudyOptions read_part_text(const std::string& text, const std::string& name) {
   yaml.get("details", study.details);
   yaml.get("alone", study.alone);
   const Variant base = read_variant(yaml, name);
-  read_names(yaml, "cameras", "camera", study.cameras);
-  read_names(yaml, "trajectories", "trajectory", study.trajectories);
+  read_names(yaml, "cameras", "camera", name, study.cameras);
+  read_names(yaml, "trajectories", "trajectory", name, study.trajectories);
   read_seeds(yaml, study.seeds);
   read_measure(yaml, study);
   read_keep(yaml, study);
   study.commands = read_commands(yaml, name);
   read_methods(yaml, base.recon, study);
   const std::vector<Axis> axes = read_axes(yaml);
-  for (YamlReader& gate : yaml.children("gates")) study.gates.push_back(read_gate(gate, axes));
+  for (YamlReader& gate : yaml.children("gates"))
+    study.gates.push_back(read_gate(gate, study, axes));
   study.summaries = read_summaries(yaml, axes, study.methods);
   yaml.finish();
   study.variants = read_variants(text, name, axes, study.cameras);

@@ -22,10 +22,6 @@ std::string without_place(const std::string& what, const std::string& name) {
   return what.starts_with(name) ? what.substr(what.find(": ") + 2) : what;
 }
 
-bool is_path(const std::string& name_or_path) {
-  return fs::path(name_or_path).has_extension() || name_or_path.find('/') != std::string::npos;
-}
-
 // What is read from a file becomes one for the time of reading. Throws Error without the place in
 // it.
 template <typename Read>
@@ -65,7 +61,14 @@ void check_cameras(const std::vector<std::string>& cameras, const std::vector<Ch
 
 void read_scene(YamlReader& yaml, const std::string& study_file, Variant& variant) {
   if (!yaml.has_mapping("scene")) {
-    yaml.get("scene", variant.simulate.scene);
+    std::string& scene = variant.simulate.scene;
+    yaml.get("scene", scene);
+    scene = here_or_beside(scene, study_file);
+    try {
+      find_preset("scenes", "scene", scene);
+    } catch (const Error& error) {
+      fail("{}: {}", yaml.where("scene"), error.what());
+    }
     return;
   }
   variant.scene_text = yaml.text("scene") + "\n";

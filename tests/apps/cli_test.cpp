@@ -51,12 +51,13 @@ class CommandLine : public ::testing::Test {
   }
   fs::path small_dataset() const {
     write("tiny.yaml", kTinyCamera);
-    const Outcome made = rugae(
-        "simulate --resolution coarse --camera tiny.yaml --trajectory 1 --frames 4 --out data");
+    const Outcome made = rugae(kSmallDataset);
     EXPECT_EQ(made.code, kDone) << made.error;
     return folder_ / "data";
   }
 
+  static constexpr const char* kSmallDataset =
+      "simulate --resolution coarse --camera tiny.yaml --trajectory 1 --frames 4 --out data";
   static constexpr const char* kTinyCamera =
       "lens: {width: 64, height: 48, horizontal_fov_deg: 100, k1: -0.05}\n"
       "sensor: {pixel_pitch_um: 6, fps: 30, bit_depth: 10, full_well_e: 18000, read_noise_e: 10}\n";
@@ -78,6 +79,12 @@ TEST_F(CommandLine, UnknownCommandsAndOptionsOfferTheNearest) {
                  "evaluate, run, check, picture, list");
   expect_refused("simulate --camrea x --out y",
                  "simulate: unknown option '--camrea'; did you mean '--camera'?");
+  expect_refused("simulate --frames=3 --out x --bogus",
+                 "simulate: unknown option '--bogus'; did you mean '--out'?");
+  expect_refused("simulate --frames=3 --outt=x",
+                 "simulate: unknown option '--outt'; did you mean '--out'?");
+  expect_refused("--threads=2 simulate --out x",
+                 "'--threads=2': no such option before a command; see rugae --help");
   expect_refused("simulate", "simulate: --out is required; see rugae simulate --help");
   expect_refused("list camera",
                  "list 'camera': no such kind; did you mean 'cameras'?; known: scenes, cameras, "
@@ -227,7 +234,91 @@ TEST_F(CommandLine, FailedCellExitsWithThree) {
   EXPECT_EQ(outcome.code, kNotAsAsked) << outcome.error;
   const auto result = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(result.at("cells"), 1);
-  EXPECT_EQ(result.at("failed_cells"), 1);
+  ASSERT_EQ(result.at("failed_cells").size(), 1u);
+  EXPECT_TRUE(
+      result.at("failed_cells")[0].get<std::string>().starts_with("tiny, trajectory 1, broken: "));
+  EXPECT_NE(outcome.error.find("cell failed: tiny, trajectory 1, broken: "), std::string::npos);
+}
+
+// A path that this stomach has no room for is its cell's failure; the others are made.
+TEST_F(CommandLine, ACellThatCannotBeSimulatedFailsAlone) {
+  write("tiny.yaml", kTinyCamera);
+  write("wide.yaml", "length_cm: 120\nclearance_mm: 90\n");
+  write("study.yaml",
+        "title: tiny\nresolution: coarse\nframes: 4\ncameras: [tiny.yaml]\n"
+        "trajectories: [wide.yaml, '1']\ncommands: {broken: ['false']}\nmethods: [broken]\n");
+  const Outcome outcome = rugae("run study.yaml --out out --json");
+  EXPECT_EQ(outcome.code, kNotAsAsked) << outcome.error;
+  EXPECT_EQ(nlohmann::json::parse(outcome.out).at("failed_cells").size(), 2u);
+  EXPECT_NE(
+      outcome.error.find("cell failed: tiny, trajectory wide, broken: trajectory 'wide' would "
+                         "leave the stomach"),
+      std::string::npos)
+      << outcome.error;
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "report.html"));
+  EXPECT_NE(read_text(folder_ / "out" / "junit.xml").find("failures=\"2\""), std::string::npos);
+}
+
+// What names a file lies beside the study, wherever the command is given.
+TEST_F(CommandLine, AStudyNamesFilesBesideIt) {
+  fs::create_directories(folder_ / "studies");
+  write("studies/tiny.yaml", kTinyCamera);
+  write("studies/mine.yaml", "like: stomach\n");
+  write("studies/path.yaml", "like: '1'\n");
+  write("studies/study.yaml",
+        "title: tiny\nscene: mine.yaml\nresolution: coarse\nframes: 4\ncameras: [tiny.yaml]\n"
+        "trajectories: [path.yaml]\ncommands: {broken: ['false']}\nmethods: [broken]\n");
+  const Outcome outcome = rugae("run studies/study.yaml --out out");
+  EXPECT_EQ(outcome.code, kNotAsAsked) << outcome.error;
+  write("studies/study.yaml",
+        "title: tiny\nscene: nothere\ncameras: [tiny.yaml]\ntrajectories: ['1']\n");
+  const Outcome misspelt = rugae("run studies/study.yaml --out none");
+  EXPECT_EQ(misspelt.code, kBadInput);
+  EXPECT_TRUE(misspelt.error.starts_with(
+      "rugae: studies/study.yaml:2:8: scene 'nothere': no such preset; known: "))
+      << misspelt.error;
+  EXPECT_FALSE(fs::exists(folder_ / "none"));
+}
+
+TEST_F(CommandLine, MistakesInGatesAreFoundBeforeAnyWork) {
+  write("tiny.yaml", kTinyCamera);
+  const std::string study =
+      "title: tiny\nresolution: coarse\nframes: 4\ncameras: [tiny.yaml]\ntrajectories: ['1']\n"
+      "gates:\n  - {metric: a.b, reason: why, ";
+  write("camera.yaml", study + "below: 1, camera: tiny.yml}\n");
+  expect_refused("run camera.yaml --out none",
+                 "camera.yaml:7:50: camera is 'tiny.yml', expected one of the study's: tiny.yaml; "
+                 "did you mean 'tiny.yaml'?");
+  write("never.yaml", study + "above: 2, below: 1}\n");
+  expect_refused("run never.yaml --out none",
+                 "never.yaml:7:39: gate on a.b is above 2 and below 1, which no number is");
+}
+
+// What was changed is not called sound by making it again; what was removed is made anew.
+TEST_F(CommandLine, AFinishedDatasetThatChangedIsRefused) {
+  small_dataset();
+  const fs::path frames = folder_ / "data/observations/frames";
+  const std::string first = read_text(frames / "000000.png");
+  fs::copy_file(frames / "000001.png", frames / "000000.png", fs::copy_options::overwrite_existing);
+  expect_refused(kSmallDataset,
+                 "data/observations/frames/000000.png: changed since the dataset was finished; "
+                 "remove it, and the same command makes it anew");
+  fs::remove(frames / "000000.png");
+  EXPECT_EQ(rugae(kSmallDataset).code, kDone);
+  EXPECT_EQ(read_text(frames / "000000.png"), first);
+  write("data/notes.txt", "");
+  expect_refused(kSmallDataset,
+                 "data/notes.txt: is none of this finished dataset's files; move it elsewhere");
+}
+
+TEST_F(CommandLine, AnEstimateDoesNotMixWithADataset) {
+  small_dataset();
+  for (const std::string folder : {"data", "data/observations"}) {
+    const std::string held = folder == "data" ? "a dataset" : "frames of observations";
+    expect_refused("reconstruct data --out " + folder,
+                   folder + ": holds " + held + ", expected a folder of the estimate's own");
+    EXPECT_FALSE(fs::exists(folder_ / folder / "trajectory.txt"));
+  }
 }
 
 TEST_F(CommandLine, FailedGateExitsWithThree) {

@@ -66,6 +66,8 @@ class Interrupted : public ::testing::Test {
 
   static constexpr const char* kGoesOn =
       "rugae: stopped on request; the same command goes on from here";
+  static constexpr const char* kBeginsAnew =
+      "rugae: stopped on request; the same command begins anew";
   fs::path folder_ = fs::temp_directory_path() / ("rugae_stopped_" + std::to_string(getpid()));
 };
 
@@ -86,6 +88,7 @@ TEST_F(Interrupted, WhileReconstructing) {
                          [] { return true; }),
               kStopped)
         << method;
+    EXPECT_EQ(last_line(), kBeginsAnew) << method;
     EXPECT_FALSE(fs::exists(folder_ / method / "estimate.json")) << method;
   }
 }

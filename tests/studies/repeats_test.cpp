@@ -65,17 +65,26 @@ TEST(Tables, ResultsHoldNoTimes) {
   EXPECT_EQ(times_json(parts).at("cells").at(0).at("simulation").at("seconds"), 4.0);
 }
 
-TEST(JUnit, AFailedGateIsAFailedTest) {
+TEST(JUnit, AFailedGateOrCellIsAFailedTest) {
+  std::vector<CellResult> cells = {cell(0, 1, 1.0), cell(0, 1, 1.0)};
+  cells[1].cell.trajectory = "2";
+  cells[1].metrics = {{"failed", "it <gave> up"}};
   const std::string xml =
-      junit_xml("A & B", {{"cam, trajectory 1", "a.b", "below 1", "0.5", "why", true},
-                          {"cam, trajectory 2", "a.b", "below 1", "2", "it is < 1", false}});
-  EXPECT_EQ(xml,
-            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
-            "<testsuite name=\"A &amp; B\" tests=\"2\" failures=\"1\">\n"
-            "  <testcase classname=\"cam, trajectory 1\" name=\"a.b below 1\"/>\n"
-            "  <testcase classname=\"cam, trajectory 2\" name=\"a.b below 1\"><failure "
-            "message=\"cam, trajectory 2: a.b is 2, expected below 1: it is &lt; 1\"/></testcase>\n"
-            "</testsuite>\n");
+      junit_xml("A & B", cells,
+                {{"cam, trajectory 1", "a.b", "below 1", "0.5", "why", true},
+                 {"cam, trajectory 2", "a.b", "below 1", "2", "it is < 1", false}});
+  EXPECT_EQ(
+      xml,
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
+      "<testsuite name=\"A &amp; B\" tests=\"4\" failures=\"2\">\n"
+      "  <testcase classname=\"cam, trajectory 1, paper, frames=12, seed 1\" name=\"runs\"/>\n"
+      "  <testcase classname=\"cam, trajectory 2, paper, frames=12, seed 1\" "
+      "name=\"runs\"><failure message=\"it "
+      "&lt;gave&gt; up\"/></testcase>\n"
+      "  <testcase classname=\"cam, trajectory 1\" name=\"a.b below 1\"/>\n"
+      "  <testcase classname=\"cam, trajectory 2\" name=\"a.b below 1\"><failure "
+      "message=\"cam, trajectory 2: a.b is 2, expected below 1: it is &lt; 1\"/></testcase>\n"
+      "</testsuite>\n");
 }
 
 }  // namespace
