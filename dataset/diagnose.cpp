@@ -72,6 +72,13 @@ class Diagnoser {
     if (won.margin == 0.0 ? !result_.compared || worst_share_ > kExplainedShare
                           : won.left > kLeftOver)
       if (two_mistakes(won.reading)) return;
+    // a mistake that is none of the usual ones may look like one of them, but not as well
+    constexpr double kMuchBetter = 0.5;
+    if (won.margin > 0.0 && won.left > kLeftOver)
+      if (const auto found = other_scale(evidence_); found && found->left < kMuchBetter * won.left) {
+        reading_ = found->reading;
+        return note({found->problem});
+      }
     if (won.margin == 0.0 && result_.compared) won = photometric_winner(readings);
     if (won.margin == 0.0) {
       if (const auto found = other_scale(evidence_)) {

@@ -91,7 +91,8 @@ std::optional<FoundScale> other_scale(Evidence& e) {
         fmt::format("{}: the poses are wrong: {}: depth led to {} is off by {} as given, by {} "
                     "otherwise",
                     e.names.poses, scale_mistake(factor), after(gap), percent(contest.medians[0]),
-                    percent(contest.medians[best]))};
+                    percent(contest.medians[best])),
+        contest.medians[best]};
   }
   return std::nullopt;
 }

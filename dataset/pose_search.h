@@ -14,6 +14,7 @@ std::optional<std::string> frozen_rotation(Evidence& e);
 struct FoundScale {
   Reading reading;
   std::string problem;
+  double left = 0.0;  // what depth is off by with it, as a share
 };
 /// The factor of the poses' lengths that makes depth agree, where there is one.
 std::optional<FoundScale> other_scale(Evidence& e);
