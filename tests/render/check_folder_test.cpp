@@ -191,6 +191,23 @@ TEST_P(CheckFolder, AnotherUnit) {
       "factor 25.");
 }
 
+// Over a short stretch a small factor looks a little like other mistakes.
+TEST_P(CheckFolder, AnotherUnitOverAFewFrames) {
+  PlainSet few = set();
+  few.track.resize(12);
+  few.images.resize(12);
+  few.depths_mm.resize(12);
+  if (!few.flows_px.empty()) few.flows_px.resize(11);
+  const std::string beginning =
+      "poses.txt: the poses are wrong: their lengths are not in the unit of the depth (a factor ";
+  constexpr double kOfRows = 0.1;  // of a rolling shutter no pose holds for the whole frame
+  for (const double factor : {5.0, 0.2}) {
+    const PlainSet wrong = few.with_depths([factor](const cv::Mat& d) { return times(d, factor); });
+    expect_named(wrong, beginning);
+    EXPECT_NEAR(std::atof(said_of(wrong).substr(beginning.size()).c_str()), 5.0, kOfRows);
+  }
+}
+
 TEST_P(CheckFolder, LeftHandedAxes) {
   expect_named(
       set().with_poses([](const Rigid3& p) {
