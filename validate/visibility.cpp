@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -63,6 +64,9 @@ void Visibility::look(const Lens& lens, const RowPoses& camera, const cv::Mat& d
   const LensProjector projector(lens);
   const double middle = 0.5 * lens.height;
   const Rigid3 whole = camera.at(middle).inverse();  // of all rows of a global shutter
+  // What is behind the camera at the first row, in the middle and at the last is so all the time.
+  const std::array<Rigid3, 3> in_time = {camera.at(0.0).inverse(), whole,
+                                         camera.at(lens.height).inverse()};
   const double cos_limit = std::cos(options_.max_incidence_rad);
   // Each triangle writes its own counters: the result does not depend on threads.
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, seen_.size(), 4096),
@@ -73,6 +77,10 @@ void Visibility::look(const Lens& lens, const RowPoses& camera, const cv::Mat& d
                         const Patch patch = patch_at(t);
                         std::optional<Vec2> pixel;
                         if (camera.rolling()) {
+                          if (std::ranges::none_of(in_time, [&](const Rigid3& pose) {
+                                return (pose * patch.centre).z() > 0.0;
+                              }))
+                            continue;
                           pixel = camera.landing(
                               projector, [&](double) { return patch.centre; }, middle);
                           if (!pixel) continue;
