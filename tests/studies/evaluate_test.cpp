@@ -77,7 +77,7 @@ TEST_F(Evaluate, AMapOneMillimetreTooLargeIsOneMillimetreOff) {
 // Without depth nobody knows what was seen of the wall; the path is measured all the same.
 TEST_F(Evaluate, ADatasetWithoutDepthHasItsPathMeasured) {
   const json whole = metrics(0.05);
-  inside_sphere::write_dataset(folder_ / "bare", false);
+  inside_sphere::write_dataset(folder_ / "bare", {.labelled = false});
   Progress progress(Progress::Output::silent);
   const json bare = evaluate(folder_ / "bare", folder_ / "estimate", progress);
   EXPECT_EQ(bare.at("trajectory"), whole.at("trajectory"));
@@ -87,6 +87,18 @@ TEST_F(Evaluate, ADatasetWithoutDepthHasItsPathMeasured) {
   EXPECT_TRUE(bare.at("coverage").is_null());
   EXPECT_TRUE(bare.at("surface").at("trajectory_aligned").is_null());
   EXPECT_EQ(bare.at("surface").at("note"), "the dataset was made without depth");
+}
+
+// A wall that went elsewhere with the camera: as much of it is seen, and the map is where it was.
+TEST_F(Evaluate, AWallThatMovedIsMeasuredWhereItWas) {
+  const json still = metrics(0.05);
+  inside_sphere::write_dataset(folder_ / "moved", {.moved_mm = {20.0f, -15.0f, 5.0f}});
+  Progress progress(Progress::Output::silent);
+  const json moved = evaluate(folder_ / "moved", folder_ / "estimate", progress);
+  EXPECT_EQ(moved.at("coverage"), still.at("coverage"));
+  const json& surface = moved.at("surface").at("trajectory_aligned");
+  EXPECT_TRUE(surface.at("completeness_max_mm").get<double>() <= kStored_mm);
+  EXPECT_EQ(surface.at("recall_at_0.25mm"), 1.0);
 }
 
 // A file that an earlier estimate of other key frames left is not this one's.

@@ -75,9 +75,15 @@ inline FrameTruth labels(const Rigid3& now, const Rigid3* next) {
   return truth;
 }
 
-inline void write_dataset(const std::filesystem::path& root, bool labelled = true) {
+struct Made {
+  bool labelled = true;
+  Vec3f moved_mm = Vec3f::Zero();  // wall and camera, from where the wall rests
+};
+
+inline void write_dataset(const std::filesystem::path& root, const Made& made = {}) {
   DatasetInfo info;
-  if (!labelled) info.truth.labels = LabelSet::none();
+  if (!made.labelled) info.truth.labels = LabelSet::none();
+  info.truth.wall_motion = !made.moved_mm.isZero();
   info.scene = "sphere";
   info.camera = "test";
   info.trajectory = "test";
@@ -85,10 +91,14 @@ inline void write_dataset(const std::filesystem::path& root, bool labelled = tru
   info.text = "{}";
   DatasetWriter writer(root, info);
   const PoseTrack poses = track();
-  writer.write_scene(camera(), poses, shapes::sphere(kRadius_mm, 40));
+  PoseTrack moved = poses;
+  for (TimedPose& pose : moved) pose.world_from_camera.translation += made.moved_mm.cast<double>();
+  const TriangleMesh wall = shapes::sphere(kRadius_mm, 40);
+  writer.write_scene(camera(), moved, wall);
   for (int i = 0; i < kFrames; ++i) {
     const Rigid3* next = i + 1 < kFrames ? &poses[i + 1].world_from_camera : nullptr;
-    const FrameTruth truth = labels(poses[i].world_from_camera, next);
+    FrameTruth truth = labels(poses[i].world_from_camera, next);
+    truth.wall_displacement_mm.assign(wall.vertices.size(), made.moved_mm);
     cv::Mat bgr(kHeight, kWidth, CV_8UC3);
     for (int y = 0; y < kHeight; ++y)
       for (int x = 0; x < kWidth; ++x) {
