@@ -26,6 +26,18 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+// Each camera of a rig has a dataset of its own.
+void check_no_rig(const fs::path& folder) {
+  if (!fs::exists(folder / "rig.json")) return;
+  std::vector<std::string> cameras;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (fs::exists(DatasetLayout{entry.path()}.info()))
+      cameras.push_back(entry.path().filename().string());
+  std::ranges::sort(cameras);
+  fail("{}: the cameras of a rig, expected one of them: {}", folder.string(),
+       fmt::join(cameras, ", "));
+}
+
 }  // namespace
 
 void add_simulate(CLI::App& app) {
@@ -182,7 +194,11 @@ void add_check(CLI::App& app, int& exit_code) {
   command.add_option("--depth", a->parts.depth, "Folder of depth: EXR, or 16-bit PNG");
   command
       .add_option("--depth-scale", a->parts.depth_scale, "Millimetres per unit of the depth files")
-      ->check(CLI::PositiveNumber);
+      ->check([](const std::string& word) {
+        double scale = 0.0;
+        const bool above = CLI::detail::lexical_cast(word, scale) && scale > 0.0;
+        return above ? std::string() : "expected a number above 0, not '" + word + "'";
+      });
   command.add_option("--poses", a->parts.poses, "Poses in TUM format, world_from_camera, mm");
   command.add_option("--flow", a->parts.flow, "Folder of flow to the next frame: EXR or .flo, px");
   command.add_option("--masks", a->parts.masks, "Folder of masks: not 0 where depth holds");
@@ -193,6 +209,7 @@ void add_check(CLI::App& app, int& exit_code) {
     const bool told =
         p.depth_scale > 0.0 || !(p.images.empty() && p.depth.empty() && p.poses.empty() &&
                                  p.flow.empty() && p.masks.empty() && p.calibration.empty());
+    check_no_rig(a->dataset);
     const bool ours = !told && fs::exists(DatasetLayout{a->dataset}.info());
     const DatasetCheck result = ours ? check_dataset(a->dataset) : check_folder(a->dataset, p);
     constexpr int kBadInput = 2;

@@ -311,6 +311,20 @@ TEST_F(CommandLine, AFinishedDatasetThatChangedIsRefused) {
                  "data/notes.txt: is none of this finished dataset's files; move it elsewhere");
 }
 
+TEST_F(CommandLine, CheckSaysWhatItExpects) {
+  expect_refused(
+      "check data --depth-scale 0",
+      "check: --depth-scale: expected a number above 0, not '0'; see rugae check --help");
+  expect_refused(
+      "check data --depth-scale mm",
+      "check: --depth-scale: expected a number above 0, not 'mm'; see rugae check --help");
+  small_dataset();
+  fs::create_directories(folder_ / "rig");
+  fs::rename(folder_ / "data", folder_ / "rig/left");
+  write("rig/rig.json", "{}");
+  expect_refused("check rig", "rig: the cameras of a rig, expected one of them: left");
+}
+
 TEST_F(CommandLine, AnEstimateDoesNotMixWithADataset) {
   small_dataset();
   for (const std::string folder : {"data", "data/observations"}) {
