@@ -29,6 +29,9 @@ struct PairAlignment {
   int inliers = 0;     // of all homographies; those that could be refined are the correspondences
   int iterations = 0;  // of Gauss-Newton
   bool converged = false;
+
+  /// There are thousands of them, and the tracks hold what is needed of them.
+  void forget_correspondences() { reference_px = moving_px = {}, point_index = {}; }
 };
 
 /// What alignment needs of a frame, computed once and shared by all pairs the frame takes part in.

@@ -10,14 +10,15 @@ namespace {
 
 constexpr int kPairsForPictures = 6;
 
-// A pair has thousands of correspondences, and the tracks hold what is needed of them.
+// Some of the pairs that have correspondences keep them.
 void keep_for_pictures(std::vector<PairAlignment>& pairs) {
-  const std::vector<int> kept = spread(static_cast<int>(pairs.size()), kPairsForPictures);
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    if (std::ranges::binary_search(kept, static_cast<int>(i))) continue;
-    pairs[i].reference_px = pairs[i].moving_px = {};
-    pairs[i].point_index = {};
-  }
+  std::vector<std::size_t> with;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (!pairs[i].reference_px.empty()) with.push_back(i);
+  std::vector<char> kept(pairs.size(), 0);
+  for (const int i : spread(static_cast<int>(with.size()), kPairsForPictures)) kept[with[i]] = 1;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (!kept[i]) pairs[i].forget_correspondences();
 }
 
 }  // namespace

@@ -16,7 +16,8 @@
 namespace rugae {
 namespace {
 
-constexpr double kReferenceWidth = 640.0;  // pixel options are meant at this width
+constexpr std::size_t kPairsWithCorrespondences = 12;  // at least, where there are so many
+constexpr double kReferenceWidth = 640.0;              // pixel options are meant at this width
 constexpr double kCornerQuality = 0.002;  // of the best corner: weak texture counts, noise does not
 constexpr int kCornerBlock = 7;           // px
 // Of the points of a key frame, those found in the next: three quarters as a rule, less than this
@@ -100,6 +101,7 @@ struct TrackFollower::Impl {
     PairFlow flow;
   } ahead;
   std::vector<PairAlignment> pairs;
+  std::size_t stride = 1;  // of those that keep their correspondences
   int failed = 0, bridges = 0, between = 0;
 
   Impl(const FrameSource& source, const AlignOptions& align, const TrackOptions& options,
@@ -111,6 +113,15 @@ struct TrackFollower::Impl {
         needed(static_cast<std::size_t>(align.neighbours) + (look_ahead ? 1 : 0)),
         field(prepare_field(source.valid(), align)),
         memory(source.valid()) {}
+
+  void keep(PairAlignment pair) {
+    if (pairs.size() % stride != 0) pair.forget_correspondences();
+    pairs.push_back(std::move(pair));
+    if (pairs.size() < 2 * kPairsWithCorrespondences * stride) return;
+    stride *= 2;
+    for (std::size_t i = 0; i < pairs.size(); ++i)
+      if (i % stride != 0) pairs[i].forget_correspondences();
+  }
 
   Prepared prepare(int index) const {
     const Frame frame = frames.pose_frame(index);
@@ -236,7 +247,7 @@ struct TrackFollower::Impl {
       chain.add(found[i]->moving, found[i]->point_index, found[i]->moving_px, spacing_px);
       memory.link(found[i]->reference, found[i]->moving);
       if (i == 0) previous = found[0];
-      pairs.push_back(std::move(*found[i]));
+      keep(std::move(*found[i]));
     }
     if (k + 1 < at.size()) prepared.erase(prepared.begin(), prepared.lower_bound(at[k + 1]));
     ++k;

@@ -24,9 +24,11 @@ std::uint64_t pair_seed(std::uint64_t seed, int reference, int moving);
 /// What following found.
 struct Followed {
   std::vector<int> keyframes;  // frame indices: as selected, and those that had to come between
-  std::vector<PairAlignment> pairs;  // of neighbouring key frames
-  std::vector<Track> tracks;         // with rays
-  std::vector<StageTime> stages;     // what it took
+  /// Of neighbouring key frames. A dozen or two of them, spread evenly, have their correspondences,
+  /// for pictures: memory does not grow with the path by what all have.
+  std::vector<PairAlignment> pairs;
+  std::vector<Track> tracks;      // with rays
+  std::vector<StageTime> stages;  // what it took
 };
 
 /// Key frames one after another. Each is aligned to the `neighbours` after it, and the inliers are

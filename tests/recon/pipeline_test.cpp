@@ -15,6 +15,7 @@
 #include "core/check.h"
 #include "core/files.h"
 #include "dataset/image_io.h"
+#include "recon/frame_follower.h"
 #include "synthetic.h"
 
 namespace rugae {
@@ -154,6 +155,23 @@ TEST_F(Pipeline, TheMapIsMadeFromAMotionOnDisk) {
           << error.what();
     }
   }
+}
+
+// Of many pairs every n-th has its correspondences, however many pairs there are.
+TEST_F(Pipeline, FewPairsKeepTheirCorrespondences) {
+  ReconOptions options;
+  options.keyframes.mean_flow_px = 2.0;
+  Progress progress(Progress::Output::silent);
+  const FrameSource frames(Observations::open(recording_.images, recording_.calibration),
+                           options.preprocess);
+  const Followed followed = follow_frames(frames, options, progress);
+  std::vector<std::size_t> with;
+  for (std::size_t i = 0; i < followed.pairs.size(); ++i)
+    if (!followed.pairs[i].reference_px.empty()) with.push_back(i);
+  std::printf("%zu pairs, %zu with correspondences\n", followed.pairs.size(), with.size());
+  ASSERT_GT(followed.pairs.size(), 24u);
+  EXPECT_TRUE(with.size() >= 12 && with.size() <= 24) << with.size();
+  for (std::size_t i = 0; i < with.size(); ++i) EXPECT_EQ(with[i], i * with[1]);
 }
 
 TEST_F(Pipeline, FramesWithoutTextureAreLostNotErrors) {
