@@ -1,6 +1,7 @@
 #include "recon/frames_between.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <utility>
 
@@ -29,13 +30,21 @@ std::vector<int> without_pose(const std::vector<std::optional<Rigid3>>& poses) {
 
 namespace {
 
-/// World_from_cam goes from that of one key frame to that of another at a steady pace, and on.
-Rigid3 steady_motion(const Structure& structure, int from, int to, int frame) {
-  const int a = structure.frames[from], b = structure.frames[to];
-  return interpolate(structure.cam_from_world[from].inverse(),
-                     structure.cam_from_world[to].inverse(),
-                     static_cast<double>(frame - a) / (b - a))
+struct Posed {
+  int frame;
+  Rigid3 cam_from_world;
+};
+
+/// World_from_cam goes from one to the other at a steady pace, and on.
+Rigid3 steady_motion(const Posed& a, const Posed& b, int frame) {
+  return interpolate(a.cam_from_world.inverse(), b.cam_from_world.inverse(),
+                     static_cast<double>(frame - a.frame) / (b.frame - a.frame))
       .inverse();
+}
+
+Rigid3 steady_motion(const Structure& structure, int from, int to, int frame) {
+  return steady_motion({structure.frames[from], structure.cam_from_world[from]},
+                       {structure.frames[to], structure.cam_from_world[to]}, frame);
 }
 
 }  // namespace
@@ -59,6 +68,30 @@ Between between(const Structure& structure, const std::vector<int>& placed, int 
   found.cam_from_world = steady_motion(structure, found.keyframes[0], found.keyframes[1], frame);
   if (frame - a > b - frame) std::swap(found.keyframes[0], found.keyframes[1]);
   return found;
+}
+
+std::vector<Rigid3> beside_frames(const std::vector<std::optional<Rigid3>>& cam_from_world,
+                                  int frame) {
+  // The nearest two on either side.
+  const auto nearest = [&](int step) {
+    std::vector<Posed> found;
+    const int n = static_cast<int>(cam_from_world.size());
+    for (int f = frame + step; f >= 0 && f < n && found.size() < 2; f += step)
+      if (const auto& pose = cam_from_world[static_cast<std::size_t>(f)])
+        found.push_back({f, *pose});
+    return found;
+  };
+  const std::array<std::vector<Posed>, 2> sides = {nearest(-1), nearest(1)};
+  std::vector<Rigid3> places;
+  if (!sides[0].empty() && !sides[1].empty())
+    places.push_back(steady_motion(sides[0][0], sides[1][0], frame));
+  for (const std::vector<Posed>& side : sides)
+    if (side.size() == 2 &&
+        std::abs(frame - side[0].frame) <= std::abs(side[0].frame - side[1].frame))
+      places.push_back(steady_motion(side[1], side[0], frame));
+  for (const std::vector<Posed>& side : sides)
+    if (!side.empty()) places.push_back(side[0].cam_from_world);
+  return places;
 }
 
 }  // namespace rugae

@@ -30,4 +30,10 @@ struct Between {
 /// `placed` as placed_keyframes() gives it, not empty.
 Between between(const Structure& structure, const std::vector<int>& placed, int frame);
 
+/// Where the camera may be, the likelier first: on its way between the nearest frames before and
+/// after that have a pose; where the motion of the two nearest on either side leads, no farther on
+/// than they are apart; where these nearest frames are.
+std::vector<Rigid3> beside_frames(const std::vector<std::optional<Rigid3>>& cam_from_world,
+                                  int frame);
+
 }  // namespace rugae

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 // Raised when the same settings give other frames or labels, or other estimates and metrics of the
 // same frames, so that older ones are not taken for new.
-constexpr int kRenderingVersion = 3, kResultsVersion = 16;
+constexpr int kRenderingVersion = 3, kResultsVersion = 17;
 constexpr std::size_t kHashLetters = 10;
 
 // A preset may build on another of its kind, so all of them count, and a file on other files.

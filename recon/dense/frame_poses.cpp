@@ -57,9 +57,10 @@ std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
   const PatchRegistrar registrar(frames.lens());
   const RollingShutter& shutter = frames.shutter();
   const cv::Mat none = cv::Mat::zeros(frames.valid().size(), CV_8U);
-  const auto place_all = [&](const auto& guesses_of) {
-    do_in_lots(rest.size(), kFramesAtOnce, progress, [&](std::size_t i) {
-      const int f = rest[i];
+  const auto place_all = [&](const std::vector<int>& which, Progress& shown,
+                             const auto& guesses_of) {
+    do_in_lots(which.size(), kFramesAtOnce, shown, [&](std::size_t i) {
+      const int f = which[i];
       const PatchImage image = prepare_patch_image({f, frames.gray(f), {}, none, frames.valid()});
       const Between around = between(structure, placed, f);
       const auto seen = seen_by(around.keyframes, patches_of, patches);
@@ -73,7 +74,7 @@ std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
     });
   };
   const std::vector<CameraMotion> motions = keyframe_motions(frames, structure);
-  place_all([&](int, const Between& around) {
+  place_all(rest, progress, [&](int, const Between& around) {
     const CameraMotion& motion = motions[around.keyframes.front()];  // of the nearer one
     std::vector<MovingPose> guesses;
     if (around.cam_from_world) guesses.push_back({*around.cam_from_world, motion});
@@ -84,9 +85,25 @@ std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
   });
   if (shutter.rolling()) {  // how the camera moves is known from the frames next to each now
     const std::vector<CameraMotion> known = motions_of(poses, frames.observations().times_s());
-    place_all([&](int f, const Between&) {
+    place_all(rest, progress, [&](int f, const Between&) {
       return poses[f] ? std::vector<MovingPose>{{*poses[f], known[f]}} : std::vector<MovingPose>{};
     });
+  }
+  // Where the pace is uneven between two key frames, the frames that were placed lead to the
+  // others.
+  Progress unshown(Progress::Output::silent);  // how many rounds of them is not known
+  for (bool more = true; more;) {
+    more = false;
+    const std::vector<int> missing = without_pose(poses);
+    const std::vector<std::optional<Rigid3>> known = poses;
+    const std::vector<CameraMotion> moves = motions_of(known, frames.observations().times_s());
+    place_all(missing, unshown, [&](int f, const Between& around) {
+      const CameraMotion& motion = moves[structure.frames[around.keyframes.front()]];
+      std::vector<MovingPose> guesses;
+      for (const Rigid3& place : beside_frames(known, f)) guesses.push_back({place, motion});
+      return guesses;
+    });
+    for (const int f : missing) more = more || poses[f].has_value();
   }
   const auto lost = std::ranges::count_if(poses, [](const auto& pose) { return !pose; });
   progress.end(fmt::format("{} of {} frames placed, {} lost", n - lost, n, lost));

@@ -54,6 +54,27 @@ TEST(FramesBetween, MotionGoesOnAtBothEnds) {
   }
 }
 
+// Frames 3, 5, 6 and 9 have a pose: what each of the others may go by.
+TEST(FramesBetween, FramesLeadToThoseBesideThem) {
+  std::vector<std::optional<Rigid3>> poses(12);
+  for (const int frame : {3, 5, 6, 9}) poses[static_cast<std::size_t>(frame)] = pose_at(frame);
+  const auto expect_places = [&](int frame, int steady, const std::vector<int>& nearest) {
+    const std::vector<Rigid3> places = beside_frames(poses, frame);
+    ASSERT_EQ(places.size(), static_cast<std::size_t>(steady) + nearest.size()) << frame;
+    for (int i = 0; i < steady; ++i)
+      expect_same(places[static_cast<std::size_t>(i)], pose_at(frame));
+    for (std::size_t i = 0; i < nearest.size(); ++i)
+      expect_same(places[static_cast<std::size_t>(steady) + i], pose_at(nearest[i]));
+  };
+  expect_places(4, 2, {3, 5});  // between, and on from 6 and 5; one frame alone leads nowhere
+  expect_places(7, 2, {6, 9});  // between, and on from 5 and 6; 9 is the last
+  expect_places(8, 1, {6, 9});  // two frames on from two that are one apart: too far
+  expect_places(10, 1, {9});    // on from 6 and 9
+  expect_places(0, 0, {3});     // three frames before two that are two apart: too far
+  poses.assign(12, std::nullopt);
+  EXPECT_TRUE(beside_frames(poses, 5).empty());
+}
+
 TEST(FramesBetween, NothingIsKnownFartherOnOrFromOneKeyframe) {
   Structure structure = steady_camera();
   EXPECT_TRUE(between(structure, placed_keyframes(structure), 26).beyond.has_value());

@@ -204,6 +204,32 @@ TEST_F(Revisits, FramesBetweenArePlacedInTheMap) {
   EXPECT_TRUE(error <= 2.0 * synthetic::path_error(whole, world_).rmse) << error;
 }
 
+// Between two key frames the camera went on and came back: neither they nor the way between them
+// tell where it was at the turn, the frames beside do.
+TEST_F(Revisits, FramesLeadToThoseBesideThem) {
+  constexpr int kAround = 4;
+  const Structure whole = linked();
+  Structure sparse = whole;
+  for (int k = kThere - kAround; k < kThere + kAround; ++k) sparse.placed[k] = false;
+  for (Track& track : sparse.tracks)
+    std::erase_if(track.observations, [&](const auto& o) { return !sparse.placed[o.keyframe]; });
+  std::erase_if(sparse.tracks, [](const Track& track) { return track.observations.size() < 2; });
+  Progress progress(Progress::Output::silent);
+  const FrameSource source = frames();
+  const auto poses = place_frames(source, sparse, make_patches(source, sparse), {}, progress);
+  std::vector<Rigid3> estimated, truth;
+  for (int k = 0; k < kCameras; ++k) {
+    ASSERT_TRUE(poses[k].has_value()) << k;
+    estimated.push_back(poses[k]->inverse());
+    truth.push_back(world_.cam_from_world[k].inverse());
+  }
+  // They have the patches of both key frames alone, up to four steps away.
+  constexpr double kShareOfStep = 0.02;
+  const double step_mm = (truth[1].translation - truth[0].translation).norm();
+  const double error = synthetic::path_error(estimated, truth).rmse;
+  EXPECT_TRUE(error <= kShareOfStep * step_mm) << error << " " << step_mm;
+}
+
 // The chain broke on the way back, where the camera turned around unseen, which no motion
 // foretells, and on the way there over three lost frames, which nothing but the motion bridges:
 // both segments are one map afterwards, as good as if it had not.
