@@ -139,7 +139,8 @@ TEST_F(RunStudy, CellsShareWhatIsTheSame) {
   EXPECT_EQ(results.at("gates").size(), 2u);
   EXPECT_NE(read_text(folder_ / "out" / "repeats.csv").find("tracking.tracked_share"),
             std::string::npos);
-  EXPECT_NE(read_text(folder_ / "out" / "junit.xml").find("tests=\"2\" failures=\"0\""),
+  // four cells, two gates
+  EXPECT_NE(read_text(folder_ / "out" / "junit.xml").find("tests=\"6\" failures=\"0\""),
             std::string::npos);
   EXPECT_NE(
       read_text(folder_ / "out" / "report.html").find("recon.keyframes.mean_flow_px=30, seed 2"),
