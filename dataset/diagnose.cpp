@@ -75,7 +75,8 @@ class Diagnoser {
     // a mistake that is none of the usual ones may look like one of them, but not as well
     constexpr double kMuchBetter = 0.5;
     if (won.margin > 0.0 && won.left > kLeftOver)
-      if (const auto found = other_scale(evidence_); found && found->left < kMuchBetter * won.left) {
+      if (const auto found = other_scale(evidence_);
+          found && found->left < kMuchBetter * won.left) {
         reading_ = found->reading;
         return note({found->problem});
       }
