@@ -225,7 +225,7 @@ int frames_of(const CellJob& job) {
 
 double memory_gb_of(const CellJob& job) {
   constexpr double kFixedGb = 0.4, kGbAPixel = 1.6e-6, kBytesInGb = 1e9;
-  constexpr double kHeldBytesAPixel = 2.0;  // of each frame, by FrameSource
+  constexpr double kHeldBytesAPixel = 1.125;  // of each frame, by FrameSource
   const double pixels = pixels_of(load_camera(job.cell.camera));
   const double held = std::min(static_cast<double>(FrameSource::kMostHeldBytes),
                                kHeldBytesAPixel * pixels * frames_of(job));

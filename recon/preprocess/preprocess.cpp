@@ -9,6 +9,7 @@
 #include "core/check.h"
 #include "recon/cache.h"
 #include "recon/preprocess/devignette.h"
+#include "recon/preprocess/packed_mask.h"
 #include "recon/preprocess/reflections.h"
 #include "recon/preprocess/undistort.h"
 
@@ -23,7 +24,7 @@ constexpr std::size_t kCachedRaws = 24;  // as many as are looked ahead for key 
 // Gray frames, and as many reflections: both are wanted again by each stage of the path.
 std::size_t held_of(const Lens& lens) {
   const auto bytes = static_cast<std::size_t>(lens.width) * lens.height;
-  return std::max(kCachedRaws, FrameSource::kMostHeldBytes / (2 * bytes));
+  return std::max(kCachedRaws, FrameSource::kMostHeldBytes / (bytes + bytes / 8));
 }
 
 }  // namespace
@@ -40,7 +41,7 @@ struct FrameSource::Impl {
   std::vector<double> profile;
   Cache<Frame> frames{kCachedFrames}, map_frames{kCachedFrames};
   Cache<cv::Mat> raws{kCachedRaws}, detections{kCachedRaws};  // as observed
-  Cache<cv::Mat> grays, reflections;
+  Cache<cv::Mat> grays, reflections;                          // the reflections packed
 
   Impl(const Observations& source, const PreprocessOptions& chosen)
       : observations(source),
@@ -89,7 +90,9 @@ struct FrameSource::Impl {
     return detections.get(index, [&] { return detected_in(raw(index)); });
   }
   cv::Mat reflection(int index) {
-    return reflections.get(index, [&] { return move_mask(detected(index)); });
+    return unpacked_mask(
+        reflections.get(index, [&] { return packed_mask(move_mask(detected(index))); }),
+        lens.width);
   }
 
   void estimate_gain() {

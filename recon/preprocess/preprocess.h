@@ -32,7 +32,7 @@ std::vector<int> vignetting_frames(int size);
 /// spread over the sequence; without frames there is none.
 class FrameSource {
  public:
-  /// A thousand frames of 640 x 480.
+  /// Seventeen hundred frames of 640 x 480.
   static constexpr std::size_t kMostHeldBytes = 600'000'000;
 
   FrameSource(const Observations& observations, const PreprocessOptions& options);
