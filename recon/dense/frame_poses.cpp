@@ -94,8 +94,11 @@ std::vector<std::optional<Rigid3>> place_frames(const FrameSource& frames,
   Progress unshown(Progress::Output::silent);  // how many rounds of them is not known
   for (bool more = true; more;) {
     more = false;
-    const std::vector<int> missing = without_pose(poses);
     const std::vector<std::optional<Rigid3>> known = poses;
+    std::vector<int> missing = without_pose(known);
+    std::erase_if(missing, [&](int f) {  // farther from all that are placed: not yet
+      return !(f > 0 && known[f - 1]) && !(f + 1 < n && known[f + 1]);
+    });
     const std::vector<CameraMotion> moves = motions_of(known, frames.observations().times_s());
     place_all(missing, unshown, [&](int f, const Between& around) {
       const CameraMotion& motion = moves[structure.frames[around.keyframes.front()]];
