@@ -69,6 +69,13 @@ void Progress::end(const std::string& remark) {
   if (!silent_) draw(true, remark);
 }
 
+void Progress::split_off(std::string stage, double seconds) {
+  check(!open_ && !stages_.empty(), "progress: nothing ended that {} was part of", stage);
+  StageTime& whole = stages_.back();
+  whole.seconds -= seconds;
+  stages_.push_back({std::move(stage), seconds, whole.peak_rss_mb});
+}
+
 void Progress::say(const std::string& line) {
   if (silent_) return;
   std::fprintf(stderr, "%s%s\n", terminal_ ? "\r\033[K" : "", line.c_str());

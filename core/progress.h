@@ -36,6 +36,9 @@ class Progress {
   /// Ends the current stage; `remark` is added to its line, such as "57 of 60 key frames".
   void end(const std::string& remark = {});
 
+  /// Of the stage that ended last, `seconds` were those of a stage of this name: both took turns.
+  void split_off(std::string stage, double seconds);
+
   /// A line of its own, without ending the stage.
   void say(const std::string& line);
 

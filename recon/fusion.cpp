@@ -36,19 +36,56 @@ constexpr double kSmallestPiece = 0.01;
 /// A depth beyond this many times the median depth of its mosaic is not believed.
 constexpr double kMaxOverMedian = 4.0;
 
-/// Depth and colour as Open3D takes them: a plain pinhole with whole-numbered pixel centres.
-struct View {
-  cv::Mat depth, bgr;
-  double fx, fy, cx, cy;  // whole-numbered centres, offset of the mosaic included
-};
+/// Diagonal of the robust bounding box of all depths, in world coordinates; 0 without any.
+double extent_of(const std::vector<DepthView>& views) {
+  std::array<std::vector<double>, 3> coordinates;
+  for (const DepthView& view : views) {
+    const Rigid3 world_from_cam = view.cam_from_world.inverse();
+    for (int y = 0; y < view.depth.rows; y += kExtentStride)
+      for (int x = 0; x < view.depth.cols; x += kExtentStride) {
+        const double z = view.depth.at<float>(y, x);
+        if (z == 0.0) continue;
+        const Vec3 p_world =
+            world_from_cam * Vec3((x - view.cx) / view.fx * z, (y - view.cy) / view.fy * z, z);
+        for (int axis = 0; axis < 3; ++axis) coordinates[axis].push_back(p_world[axis]);
+      }
+  }
+  if (coordinates[0].empty()) return 0.0;
+  Vec3 size;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double>& values = coordinates[axis];
+    std::sort(values.begin(), values.end());
+    const auto at = [&](double share) {
+      return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+    };
+    size[axis] = at(kHighShare) - at(kLowShare);
+  }
+  return size.norm();
+}
 
-View to_view(const Mosaic& mosaic, const MosaicDepth& placed, const Lens& lens) {
-  View view{placed.depth.clone(),
-            mosaic.bgr,
-            lens.fx,
-            lens.fy,
-            lens.cx - mosaic.origin_px.x() - 0.5,
-            lens.cy - mosaic.origin_px.y() - 0.5};
+open3d::geometry::RGBDImage rgbd_of(const DepthView& view) {
+  open3d::geometry::RGBDImage image;
+  image.depth_.Prepare(view.depth.cols, view.depth.rows, 1, 4);
+  image.color_.Prepare(view.bgr.cols, view.bgr.rows, 3, 1);
+  cv::Mat rgb;
+  cv::cvtColor(view.bgr, rgb, cv::COLOR_BGR2RGB);
+  check(view.depth.isContinuous() && rgb.isContinuous(), "fuse_views: pictures are not continuous");
+  std::memcpy(image.depth_.data_.data(), view.depth.data, image.depth_.data_.size());
+  std::memcpy(image.color_.data_.data(), rgb.data, image.color_.data_.size());
+  return image;
+}
+
+}  // namespace
+
+DepthView depth_view(const Mosaic& mosaic, const MosaicDepth& placed, const Structure& structure,
+                     const Lens& lens) {
+  DepthView view{placed.depth.clone(),
+                 mosaic.bgr,
+                 lens.fx,
+                 lens.fy,
+                 lens.cx - mosaic.origin_px.x() - 0.5,
+                 lens.cy - mosaic.origin_px.y() - 0.5,
+                 structure.cam_from_world[mosaic.anchor]};
   if (!is_pinhole(lens)) {
     // Frames kept with their distortion: each pinhole pixel takes from where the lens images it.
     const LensProjector projector(lens);
@@ -83,61 +120,9 @@ View to_view(const Mosaic& mosaic, const MosaicDepth& placed, const Lens& lens) 
   return view;
 }
 
-/// Diagonal of the robust bounding box of all depths, in world coordinates; 0 without any.
-double extent_of(const std::vector<View>& views, const std::vector<Rigid3>& cams_from_world) {
-  std::array<std::vector<double>, 3> coordinates;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const Rigid3 world_from_cam = cams_from_world[i].inverse();
-    for (int y = 0; y < views[i].depth.rows; y += kExtentStride)
-      for (int x = 0; x < views[i].depth.cols; x += kExtentStride) {
-        const double z = views[i].depth.at<float>(y, x);
-        if (z == 0.0) continue;
-        const Vec3 p_world = world_from_cam * Vec3((x - views[i].cx) / views[i].fx * z,
-                                                   (y - views[i].cy) / views[i].fy * z, z);
-        for (int axis = 0; axis < 3; ++axis) coordinates[axis].push_back(p_world[axis]);
-      }
-  }
-  if (coordinates[0].empty()) return 0.0;
-  Vec3 size;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double>& values = coordinates[axis];
-    std::sort(values.begin(), values.end());
-    const auto at = [&](double share) {
-      return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-    };
-    size[axis] = at(kHighShare) - at(kLowShare);
-  }
-  return size.norm();
-}
-
-open3d::geometry::RGBDImage rgbd_of(const View& view) {
-  open3d::geometry::RGBDImage image;
-  image.depth_.Prepare(view.depth.cols, view.depth.rows, 1, 4);
-  image.color_.Prepare(view.bgr.cols, view.bgr.rows, 3, 1);
-  cv::Mat rgb;
-  cv::cvtColor(view.bgr, rgb, cv::COLOR_BGR2RGB);
-  check(view.depth.isContinuous() && rgb.isContinuous(), "fuse_map: pictures are not continuous");
-  std::memcpy(image.depth_.data_.data(), view.depth.data, image.depth_.data_.size());
-  std::memcpy(image.color_.data_.data(), rgb.data, image.color_.data_.size());
-  return image;
-}
-
-}  // namespace
-
-TriangleMesh fuse_map(const std::vector<Mosaic>& mosaics,
-                      const std::vector<std::optional<MosaicDepth>>& depths,
-                      const Structure& structure, const Lens& lens, const MapOptions& options) {
+TriangleMesh fuse_views(std::vector<DepthView> views, const MapOptions& options) {
   options.check();
-  check(mosaics.size() == depths.size(), "fuse_map: {} mosaics but {} depths", mosaics.size(),
-        depths.size());
-  std::vector<View> views;
-  std::vector<Rigid3> cams_from_world;
-  for (std::size_t i = 0; i < mosaics.size(); ++i) {
-    if (!depths[i]) continue;
-    views.push_back(to_view(mosaics[i], *depths[i], lens));
-    cams_from_world.push_back(structure.cam_from_world[mosaics[i].anchor]);
-  }
-  const double extent = extent_of(views, cams_from_world);
+  const double extent = extent_of(views);
   if (!(extent > 0.0)) return {};
 
   // Open3D works in the map's own units; the map is scaled to an extent of one, so that its fixed
@@ -148,15 +133,15 @@ TriangleMesh fuse_map(const std::vector<Mosaic>& mosaics,
   const OneOpenMpThread one_thread;
   tsdf::ScalableTSDFVolume volume(voxel, kTruncationVoxels * voxel,
                                   tsdf::TSDFVolumeColorType::RGB8);
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    views[i].depth /= extent;
+  for (DepthView& view : views) {
+    view.depth /= extent;
     Mat4 cam_from_world = Mat4::Identity();
-    cam_from_world.topRows<3>() = cams_from_world[i].matrix3x4();
+    cam_from_world.topRows<3>() = view.cam_from_world.matrix3x4();
     cam_from_world.topRightCorner<3, 1>() /= extent;
-    const open3d::camera::PinholeCameraIntrinsic pinhole(views[i].depth.cols, views[i].depth.rows,
-                                                         views[i].fx, views[i].fy, views[i].cx,
-                                                         views[i].cy);
-    volume.Integrate(rgbd_of(views[i]), pinhole, cam_from_world);
+    const open3d::camera::PinholeCameraIntrinsic pinhole(view.depth.cols, view.depth.rows, view.fx,
+                                                         view.fy, view.cx, view.cy);
+    volume.Integrate(rgbd_of(view), pinhole, cam_from_world);
+    view = {};  // the volume grows as the pictures go
   }
   const auto fused = volume.ExtractTriangleMesh();
 

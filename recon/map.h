@@ -33,11 +33,20 @@ struct MosaicDepth {
 std::optional<MosaicDepth> place_mosaic(const Mosaic& mosaic, const Structure& structure,
                                         const Lens& lens, const ShadingOptions& options);
 
+/// A placed mosaic as fusion takes it: seven bytes a pixel.
+struct DepthView {
+  cv::Mat depth;          // CV_32F, of a pinhole, map units; 0 where unknown or not believed
+  cv::Mat bgr;            // CV_8UC3, may be the mosaic's own
+  double fx, fy, cx, cy;  // whole-numbered pixel centres
+  Rigid3 cam_from_world;
+};
+
+DepthView depth_view(const Mosaic& mosaic, const MosaicDepth& placed, const Structure& structure,
+                     const Lens& lens);
+
 /// Fuses the placed mosaics (TSDF) into one coloured mesh; geometric normals point away from the
-/// cameras. Small pieces that hang in the air are left out. Empty when nothing was placed.
-TriangleMesh fuse_map(const std::vector<Mosaic>& mosaics,
-                      const std::vector<std::optional<MosaicDepth>>& depths,
-                      const Structure& structure, const Lens& lens, const MapOptions& options);
+/// cameras. Small pieces that hang in the air are left out. Empty without any depth.
+TriangleMesh fuse_views(std::vector<DepthView> views, const MapOptions& options);
 
 /// z-depth (CV_32F) of a key frame on the ORIGINAL (distorted) pixel grid, from the fused map: the
 /// nearest triangle on each pixel's ray; NaN where the map has nothing.

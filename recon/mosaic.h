@@ -5,7 +5,7 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "recon/align.h"
+#include "recon/mosaic_plan.h"
 #include "recon/options.h"
 #include "recon/preprocess/preprocess.h"
 #include "recon/structure.h"
@@ -23,8 +23,7 @@ struct Mosaic {
   Vec2 origin_px = Vec2::Zero();  // anchor pixel = mosaic pixel + origin
 };
 
-std::vector<Mosaic> compose_mosaics(const FrameSource& frames, const Structure& structure,
-                                    const std::vector<PairAlignment>& pairs,
-                                    const MosaicOptions& options);
+Mosaic compose_mosaic(const FrameSource& frames, const Structure& structure, const MosaicPlan& plan,
+                      const MosaicOptions& options);
 
 }  // namespace rugae

@@ -156,11 +156,10 @@ void draw_depth_maps(const PictureSink& sink, const std::vector<DepthExample>& e
   }
 }
 
-void draw_mosaics(const PictureSink& sink, const std::vector<Mosaic>& mosaics,
-                  const std::vector<std::optional<MosaicDepth>>& depths, std::size_t at_most) {
-  for (const int m : spread(static_cast<int>(mosaics.size()), static_cast<int>(at_most))) {
-    const Mosaic& mosaic = mosaics[m];
-    const std::string name = fmt::format("{:03}.png", m);
+void draw_mosaics(const PictureSink& sink, const std::vector<MosaicExample>& examples) {
+  for (const MosaicExample& example : examples) {
+    const Mosaic& mosaic = example.mosaic;
+    const std::string name = fmt::format("{:03}.png", example.number);
     sink("mosaic/" + name, mosaic.bgr);
     cv::Mat drawn = mosaic.bgr.clone();
     for (int y = 1; y < drawn.rows; ++y)
@@ -169,7 +168,7 @@ void draw_mosaics(const PictureSink& sink, const std::vector<Mosaic>& mosaics,
             mosaic.seams.at<int>(y, x) != mosaic.seams.at<int>(y - 1, x))
           drawn.at<cv::Vec3b>(y, x) = {0, 255, 255};
     sink("seams/" + name, drawn);
-    if (depths[m]) sink("depth/" + name, relief_picture(depths[m]->depth));
+    if (example.depth) sink("depth/" + name, relief_picture(example.depth->depth));
   }
 }
 

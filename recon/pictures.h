@@ -6,8 +6,7 @@
 
 #include "recon/dense/dense_map.h"
 #include "recon/listener.h"
-#include "recon/map.h"
-#include "recon/mosaic.h"
+#include "recon/mosaic_map.h"
 #include "recon/preprocess/preprocess.h"
 #include "recon/structure.h"
 
@@ -35,8 +34,7 @@ struct FollowedPoint {
 void draw_followed(const PictureSink& sink, const cv::Mat& gray, int frame,
                    const std::vector<FollowedPoint>& points);
 /// mosaic and depth: each mosaic, with the seams drawn in, and its depth.
-void draw_mosaics(const PictureSink& sink, const std::vector<Mosaic>& mosaics,
-                  const std::vector<std::optional<MosaicDepth>>& depths, std::size_t at_most);
+void draw_mosaics(const PictureSink& sink, const std::vector<MosaicExample>& examples);
 
 /// links: for each two key frames, in the order of time, how many points both see (logarithmic,
 /// black for none). A chain is a diagonal; what is off it was seen again.

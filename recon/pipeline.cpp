@@ -11,7 +11,7 @@
 #include "recon/dense/dense_map.h"
 #include "recon/dense/moving_keyframes.h"
 #include "recon/map.h"
-#include "recon/mosaic.h"
+#include "recon/mosaic_map.h"
 #include "recon/pictures.h"
 #include "recon/reconstruction.h"
 #include "recon/spread.h"
@@ -21,20 +21,6 @@ namespace {
 
 constexpr int kPictures = 6;         // of each stage
 constexpr std::size_t kAtOnce = 16;  // depth maps between two steps of the progress line
-
-std::vector<std::optional<MosaicDepth>> place_all(const std::vector<Mosaic>& mosaics,
-                                                  const Structure& structure, const Lens& lens,
-                                                  const ReconOptions& options, const Stages& stages,
-                                                  Progress& progress) {
-  progress.begin("shape from shading", mosaics.size());
-  std::vector<std::optional<MosaicDepth>> depths(mosaics.size());
-  do_in_lots(mosaics.size(), kAtOnce, progress, [&](std::size_t i) {
-    depths[i] = stages.depth(mosaics[i], structure, lens, options);
-  });
-  const auto placed = std::ranges::count_if(depths, [](const auto& d) { return d.has_value(); });
-  progress.end(fmt::format("{} of {} mosaics placed", placed, mosaics.size()));
-  return depths;
-}
 
 // `motions` of the key frames, or none.
 void write_depth(const EstimateLayout& layout, const TriangleMesh& map, const Structure& structure,
@@ -98,9 +84,10 @@ MadeMap make_map(const FrameSource& frames, const Structure& structure,
                  const std::vector<CameraMotion>& motions, const std::vector<PairAlignment>& pairs,
                  const ReconOptions& options, const Stages& stages, Progress& progress) {
   MadeMap made;
+  const int examples = options.pictures ? kPictures : 0;
   if (options.method == "dense") {
     DenseMap map = build_dense_map(frames, structure, motions, options.preprocess.reflections,
-                                   options.dense, options.pictures ? kPictures : 0, progress);
+                                   options.dense, examples, progress);
     made.mesh = std::move(map.mesh);
     made.examples = std::move(map.examples);
     made.numbers = {{"depth_maps", map.depth_maps},
@@ -108,11 +95,10 @@ MadeMap make_map(const FrameSource& frames, const Structure& structure,
                     {"median_sigma_over_depth", map.median_sigma}};
     return made;
   }
-  progress.begin("mosaics");  // algorithm 3, steps 8 to 10
-  made.mosaics = compose_mosaics(frames, structure, pairs, options.mosaic);
-  made.depths = place_all(made.mosaics, structure, frames.lens(), options, stages, progress);
-  progress.begin("map");
-  made.mesh = fuse_map(made.mosaics, made.depths, structure, frames.lens(), options.map);
+  MosaicMap map =
+      build_mosaic_map(frames, structure, pairs, options, stages, 2 * examples, progress);
+  made.mesh = std::move(map.mesh);
+  made.mosaics = std::move(map.examples);
   return made;
 }
 
@@ -152,7 +138,7 @@ Estimate build_map(const FrameSource& frames, const Motion& motion, const ReconO
     if (options.method == "dense")
       draw_depth_maps(sink, made.examples, options.dense.max_sigma_share);
     else
-      draw_mosaics(sink, made.mosaics, made.depths, 2 * kPictures);
+      draw_mosaics(sink, made.mosaics);
   }
   progress.end();
   estimate.stages = motion.stages;

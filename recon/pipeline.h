@@ -12,7 +12,7 @@
 #include "recon/dense/dense_map.h"
 #include "recon/listener.h"
 #include "recon/map.h"
-#include "recon/mosaic.h"
+#include "recon/mosaic_map.h"
 #include "recon/motion.h"
 #include "recon/options.h"
 #include "recon/stages.h"
@@ -28,9 +28,8 @@ Estimate reconstruct(const Observations& observations, const ReconOptions& optio
 struct MadeMap {
   TriangleMesh mesh;  // in the structure's world
   std::map<std::string, double> numbers;
-  std::vector<DepthExample> examples;              // of `dense`
-  std::vector<Mosaic> mosaics;                     // of `paper`
-  std::vector<std::optional<MosaicDepth>> depths;  // of each
+  std::vector<DepthExample> examples;  // of `dense`
+  std::vector<MosaicExample> mosaics;  // of `paper`
 };
 
 /// `pairs` of neighbouring key frames; `motions` as in build_dense_map().

@@ -19,6 +19,7 @@ namespace {
 constexpr int kVignettingFrames = 16;  // spread over the sequence
 constexpr int kProfileSamples = 257;   // of the published profile
 constexpr std::size_t kCachedFrames = 6;
+constexpr std::size_t kCachedMapFrames = 32;  // the members of two neighbouring mosaics
 constexpr std::size_t kCachedRaws = 24;  // as many as are looked ahead for key frames, and more
 
 // Gray frames, and as many reflections: both are wanted again by each stage of the path.
@@ -39,7 +40,7 @@ struct FrameSource::Impl {
   cv::Mat valid;
   cv::Mat gain;  // 1 / V; empty when switched off
   std::vector<double> profile;
-  Cache<Frame> frames{kCachedFrames}, map_frames{kCachedFrames};
+  Cache<Frame> frames{kCachedFrames}, map_frames{kCachedMapFrames};
   Cache<cv::Mat> raws{kCachedRaws}, detections{kCachedRaws};  // as observed
   Cache<cv::Mat> grays, reflections;                          // the reflections packed
 

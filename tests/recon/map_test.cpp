@@ -106,8 +106,16 @@ std::vector<std::optional<MosaicDepth>> place_all(const Scene& scene, const Lens
   return depths;
 }
 
+TriangleMesh fuse(const Scene& scene, const std::vector<std::optional<MosaicDepth>>& depths,
+                  const Lens& lens, const MapOptions& options = {}) {
+  std::vector<DepthView> views;
+  for (std::size_t i = 0; i < depths.size(); ++i)
+    if (depths[i]) views.push_back(depth_view(scene.mosaics[i], *depths[i], scene.structure, lens));
+  return fuse_views(std::move(views), options);
+}
+
 TriangleMesh map_of(const Scene& scene, const Lens& lens, const MapOptions& options = {}) {
-  return fuse_map(scene.mosaics, place_all(scene, lens), scene.structure, lens, options);
+  return fuse(scene, place_all(scene, lens), lens, options);
 }
 
 /// Six views from near the centre of a sphere cover all of it.
@@ -232,7 +240,7 @@ TEST(Map, SteepWallIsNotShiftedByHalfAPixel) {
     }
   ASSERT_GE(count, 8000);
   EXPECT_LE(std::abs(bias / count), kHalfOfTheShift);
-  const TriangleMesh mesh = fuse_map(scene.mosaics, depths, scene.structure, lens, MapOptions{});
+  const TriangleMesh mesh = fuse(scene, depths, lens);
   ASSERT_FALSE(mesh.empty());
   double mesh_bias = 0.0;
   for (const Vec3& vertex : mesh.vertices) mesh_bias += normal.dot(vertex) - kOffset;

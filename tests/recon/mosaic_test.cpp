@@ -285,9 +285,9 @@ TEST(Mosaic, FramesOfAFolderBecomeOneMosaic) {
   plain.undistort = plain.devignette = false;
   plain.reflections.suppress_for_map = false;
   const FrameSource frames(Observations::open(folder / "frames", folder / "lens.yaml"), plain);
-  const auto mosaics = compose_mosaics(frames, turning.structure, turning.pairs, MosaicOptions{});
-  ASSERT_EQ(mosaics.size(), 1u);
-  const Mosaic& mosaic = mosaics[0];
+  const auto plans = plan_mosaics(turning.structure, turning.pairs, frames.lens(), {});
+  ASSERT_EQ(plans.size(), 1u);
+  const Mosaic mosaic = compose_mosaic(frames, turning.structure, plans[0], {});
   EXPECT_EQ(mosaic.anchor, 1);
   EXPECT_EQ(mosaic.members.size(), 3u);
   EXPECT_GE(mosaic.bgr.cols, lens.width + 20);
