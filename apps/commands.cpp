@@ -26,6 +26,15 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+// CLI11 reads -1 as the largest number there is where none is below zero.
+CLI::Validator whole_number() {
+  return {[](std::string& text) {
+            const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
+            return digits ? std::string() : fmt::format("'{}', expected 0, 1, 2 ...", text);
+          },
+          ""};
+}
+
 // Each camera of a rig has a dataset of its own.
 void check_no_rig(const fs::path& folder) {
   if (!fs::exists(folder / "rig.json")) return;
@@ -64,8 +73,10 @@ void add_simulate(CLI::App& app) {
       ->capture_default_str();
   command.add_option("--first", a->options.first,
                      "Only the first so many of them, at the same pace; 0: all");
-  command.add_option("--only-frame", a->options.only_frame, "Render this frame alone");
+  command.add_option("--only-frame", a->options.only_frame, "Render this frame alone")
+      ->check(whole_number());
   command.add_option("--seed", a->options.seed, "Draws the stomach, the path and the noise")
+      ->check(whole_number())
       ->capture_default_str();
   command.add_option("--threads", a->options.threads, "0: all processors")->capture_default_str();
   command.add_option("--options", a->settings, "YAML with the settings of light, lens and sensor");

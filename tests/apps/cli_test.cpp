@@ -86,6 +86,10 @@ TEST_F(CommandLine, UnknownCommandsAndOptionsOfferTheNearest) {
   expect_refused("--threads=2 simulate --out x",
                  "'--threads=2': no such option before a command; see rugae --help");
   expect_refused("simulate", "simulate: --out is required; see rugae simulate --help");
+  expect_refused("simulate --seed -1 --out x",
+                 "simulate: --seed: '-1', expected 0, 1, 2 ...; see rugae simulate --help");
+  expect_refused("simulate --only-frame 1.5 --out x",
+                 "simulate: --only-frame: '1.5', expected 0, 1, 2 ...; see rugae simulate --help");
   expect_refused("list camera",
                  "list 'camera': no such kind; did you mean 'cameras'?; known: scenes, cameras, "
                  "rigs, trajectories, studies");
