@@ -12,6 +12,7 @@
 #include "core/progress.h"
 #include "dataset/check_dataset.h"
 #include "dataset/check_folder.h"
+#include "dataset/export/export.h"
 #include "dataset/frame_sheet.h"
 #include "dataset/image_io.h"
 #include "dataset/layout.h"
@@ -275,19 +276,64 @@ void add_picture(CLI::App& app) {
   });
 }
 
+void add_export(CLI::App& app) {
+  struct Arguments {
+    ExportOptions options;
+    fs::path dataset, out;
+    bool json = false;
+  };
+  const auto a = std::make_shared<Arguments>();
+  CLI::App& command =
+      *app.add_subcommand("export", "A dataset in the layout that another program reads");
+  command.add_option("dataset", a->dataset, "The dataset's folder")->required();
+  command.add_option("--format", a->options.format, "One of `rugae list formats`, such as colmap")
+      ->required();
+  command.add_option("--depth-per-mm", a->options.depth_per_mm,
+                     "Steps of depth images a millimetre; 0: as the format has it");
+  command.add_option("--out", a->out, "The export's folder")->required();
+  add_json_flag(command, a->json);
+  command.callback([a] {
+    check_no_rig(a->dataset);
+    Progress::catch_interrupts();
+    Progress progress;
+    const ExportReport report = export_dataset(a->dataset, a->options, a->out, progress);
+    std::string text =
+        fmt::format("{}: {} frames as {}", a->out.string(), report.frames, a->options.format);
+    for (const std::string& note : report.notes) text += "\n  " + note;
+    print(a->json,
+          {{"export", a->out.string()},
+           {"format", a->options.format},
+           {"frames", report.frames},
+           {"notes", report.notes}},
+          text);
+  });
+}
+
 void add_list(CLI::App& app) {
   struct Arguments {
     std::string kind;
     bool json = false;
   };
   const auto a = std::make_shared<Arguments>();
-  CLI::App& command = *app.add_subcommand("list", "Names of the presets");
-  command.add_option("kind", a->kind, "scenes, cameras, rigs, trajectories or studies")->required();
+  CLI::App& command = *app.add_subcommand("list", "Names of the presets, and of the formats");
+  command.add_option("kind", a->kind, "scenes, cameras, rigs, trajectories, studies or formats")
+      ->required();
   add_json_flag(command, a->json);
   command.callback([a] {
-    const std::vector<std::string> kinds = {"scenes", "cameras", "rigs", "trajectories", "studies"};
+    const std::vector<std::string> kinds = {"scenes",       "cameras", "rigs",
+                                            "trajectories", "studies", "formats"};
     check(std::ranges::count(kinds, a->kind) > 0, "list '{}': no such kind{}; known: {}", a->kind,
           did_you_mean(a->kind, kinds), fmt::join(kinds, ", "));
+    if (a->kind == "formats") {
+      Json all = Json::object();
+      std::string text;
+      for (const ExportFormat& format : export_formats()) {
+        all[format.name] = format.what;
+        text += fmt::format("{}{:<12}{}", text.empty() ? "" : "\n", format.name, format.what);
+      }
+      print(a->json, all, text);
+      return;
+    }
     const auto names = preset_names(a->kind == "rigs" ? "cameras/rigs" : a->kind);
     print(a->json, names, fmt::format("{}", fmt::join(names, "\n")));
   });

@@ -13,6 +13,7 @@ void add_calibrate(CLI::App& app);
 void add_reconstruct(CLI::App& app);
 void add_evaluate(CLI::App& app);
 void add_picture(CLI::App& app);
+void add_export(CLI::App& app);
 void add_list(CLI::App& app);
 /// These two end normally with another exit code than 0: 3 for a failed gate, 2 for a dataset with
 /// problems.

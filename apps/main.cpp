@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
   rugae::add_run(app, exit_code);
   rugae::add_check(app, exit_code);
   rugae::add_picture(app);
+  rugae::add_export(app);
   rugae::add_list(app);
   try {
     app.parse(argc, argv);
@@ -59,7 +60,8 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return said(kBadInput, rugae::usage_error(app, argc, argv, error).c_str());
   } catch (const rugae::Interrupted& stop) {
-    const bool goes_on = app.got_subcommand("simulate") || app.got_subcommand("run");
+    const bool goes_on =
+        app.got_subcommand("simulate") || app.got_subcommand("run") || app.got_subcommand("export");
     return said(kInterrupted,
                 (std::string(stop.what()) + (goes_on ? "; the same command goes on from here"
                                                      : "; the same command begins anew"))

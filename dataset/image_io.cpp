@@ -28,6 +28,7 @@ std::string lower_extension(const fs::path& file) {
 }
 
 bool is_jpeg(const std::string& extension) { return extension == ".jpg" || extension == ".jpeg"; }
+bool is_tiff(const std::string& extension) { return extension == ".tif" || extension == ".tiff"; }
 
 // The PNGs that the flags leave as they are; nothing for others.
 std::optional<cv::Mat> decoded_png(const std::string& name, std::string_view bytes, int flags) {
@@ -63,19 +64,22 @@ bool has_image_extension(const fs::path& file) {
 
 void write_image(const fs::path& file, const cv::Mat& image, int jpeg_quality) {
   const std::string extension = lower_extension(file);
-  check(extension == ".png" || is_jpeg(extension), "{}: images are written as .png or .jpg",
-        file.string());
+  check(extension == ".png" || is_jpeg(extension) || is_tiff(extension),
+        "{}: images are written as .png, .jpg or .tiff", file.string());
   check(!image.empty(), "{}: the image to write is empty", file.string());
   const bool eight = image.depth() == CV_8U, sixteen = image.depth() == CV_16U;
-  check((eight || (sixteen && extension == ".png")) &&
+  check((eight || (sixteen && !is_jpeg(extension))) &&
             (image.channels() == 1 || image.channels() == 3),
-        "{}: image of type {}, expected 8-bit (PNG also 16-bit) with 1 or 3 channels",
+        "{}: image of type {}, expected 8-bit (PNG and TIFF also 16-bit) with 1 or 3 channels",
         file.string(), cv::typeToString(image.type()));
   if (extension == ".png") {
     write_atomic(file, encode_png(image));
     return;
   }
-  const std::vector<int> parameters = {cv::IMWRITE_JPEG_QUALITY, jpeg_quality};
+  constexpr int kNotCompressed = 1;  // what every reader of TIFF knows
+  const std::vector<int> parameters =
+      is_jpeg(extension) ? std::vector<int>{cv::IMWRITE_JPEG_QUALITY, jpeg_quality}
+                         : std::vector<int>{cv::IMWRITE_TIFF_COMPRESSION, kNotCompressed};
   std::vector<unsigned char> bytes;
   bool encoded = false;
   std::string reason;

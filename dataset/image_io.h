@@ -8,8 +8,8 @@
 
 namespace rugae {
 
-/// PNG (or JPEG by extension, `jpeg_quality` 1 to 100), 8-bit one or three channels (BGR); PNG also
-/// 16-bit. Throws Error naming the file.
+/// PNG (or by extension JPEG, `jpeg_quality` 1 to 100, or TIFF, not compressed), 8-bit one or three
+/// channels (BGR); PNG and TIFF also 16-bit. Throws Error naming the file.
 void write_image(const std::filesystem::path& file, const cv::Mat& image, int jpeg_quality = 95);
 /// 8-bit BGR (CV_8UC3), on the file's own pixel grid (orientation tags are not applied). Throws
 /// Error "...: truncated or not an image" for damaged files: a PNG must be whole to its IEND chunk,

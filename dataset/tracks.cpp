@@ -17,6 +17,7 @@ namespace rugae {
 namespace fs = std::filesystem;
 namespace {
 
+const std::string kPointsHeader = "point,triangle,b1,b2";
 const std::string kTracksHeader = "point,x,y,depth_mm,visible";
 
 // The triangles of a frame, each once.
@@ -37,7 +38,7 @@ std::vector<int> triangles_in(const fs::path& file) {
 }  // namespace
 
 std::string track_points_text(const std::vector<TrackPoint>& points) {
-  std::string text = "point,triangle,b1,b2\n";
+  std::string text = kPointsHeader + "\n";
   for (const TrackPoint& p : points)
     text += fmt::format("{},{},{:.9g},{:.9g}\n", p.point, p.triangle, p.b1, p.b2);
   return text;
@@ -49,6 +50,16 @@ std::string tracks_text(const std::vector<TrackSample>& samples) {
     text += fmt::format("{},{:.17g},{:.17g},{:.17g},{}\n", s.point, s.pixel.x(), s.pixel.y(),
                         s.depth_mm, s.visible ? 1 : 0);
   return text;
+}
+
+std::vector<TrackPoint> read_track_points(const fs::path& file) {
+  std::vector<TrackPoint> points;
+  for (const CsvLine& line : read_csv(file, kPointsHeader))
+    points.push_back({static_cast<int>(csv_number(file, line, 0)),
+                      static_cast<int>(csv_number(file, line, 1)),
+                      static_cast<float>(csv_number(file, line, 2)),
+                      static_cast<float>(csv_number(file, line, 3))});
+  return points;
 }
 
 std::vector<TrackSample> read_tracks(const fs::path& file) {

@@ -28,7 +28,8 @@ struct TrackSample {
 /// "point,triangle,b1,b2" and "point,x,y,depth_mm,visible", a line each.
 std::string track_points_text(const std::vector<TrackPoint>& points);
 std::string tracks_text(const std::vector<TrackSample>& samples);
-/// Throw Error with file and line.
+/// Throw Error with file and line. `seen_along_normal` of a point is not on disk.
+std::vector<TrackPoint> read_track_points(const std::filesystem::path& file);
 std::vector<TrackSample> read_tracks(const std::filesystem::path& file);
 
 /// "triangle,frames" for every triangle that some pixel of some frame sees: in how many frames it

@@ -5,6 +5,7 @@
 #include "core/check.h"
 #include "dataset/check_dataset.h"
 #include "dataset/estimate.h"
+#include "dataset/export/export.h"
 #include "dataset/image_io.h"
 #include "dataset/label_images.h"
 #include "dataset/truth.h"
@@ -202,6 +203,18 @@ void bind_datasets(py::module_& module) {
         return check_dataset(folder).problems;
       },
       py::arg("folder"), "The problems of a dataset, one line each; empty when it is sound.");
+
+  module.def(
+      "export",
+      [](const std::string& folder, const std::string& format, const std::string& out,
+         double depth_per_mm) {
+        py::gil_scoped_release others_may_run;
+        Progress quiet(Progress::Output::silent);
+        return export_dataset(folder, {format, depth_per_mm}, out, quiet).notes;
+      },
+      py::arg("folder"), py::arg("format"), py::arg("out"), py::arg("depth_per_mm") = 0.0,
+      "Writes a dataset as tum, colmap, nerfstudio or c3vd (docs/export.md); returns what its "
+      "reader should know, one line each.");
 }
 
 }  // namespace rugae::python

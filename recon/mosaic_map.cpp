@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/seconds_of.h"
-#include "recon/spread.h"
+#include "core/spread.h"
 
 namespace rugae {
 namespace {

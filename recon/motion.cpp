@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/check.h"
-#include "recon/spread.h"
+#include "core/spread.h"
 
 namespace rugae {
 namespace {

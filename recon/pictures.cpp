@@ -6,12 +6,12 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/spread.h"
 #include "core/units.h"
 #include "dataset/colours.h"
 #include "recon/flow.h"
 #include "recon/keyframes.h"
 #include "recon/preprocess/reflections.h"
-#include "recon/spread.h"
 
 namespace rugae {
 namespace {

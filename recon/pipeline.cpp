@@ -7,6 +7,7 @@
 #include "core/check.h"
 #include "core/files.h"
 #include "core/in_lots.h"
+#include "core/spread.h"
 #include "dataset/image_io.h"
 #include "recon/dense/dense_map.h"
 #include "recon/dense/moving_keyframes.h"
@@ -14,7 +15,6 @@
 #include "recon/mosaic_map.h"
 #include "recon/pictures.h"
 #include "recon/reconstruction.h"
-#include "recon/spread.h"
 
 namespace rugae {
 namespace {

@@ -12,6 +12,7 @@
 
 #include "core/check.h"
 #include "core/in_lots.h"
+#include "core/spread.h"
 #include "recon/cache.h"
 #include "recon/dense/albedo.h"
 #include "recon/dense/consistency.h"
@@ -20,7 +21,6 @@
 #include "recon/dense/view_choice.h"
 #include "recon/dense/volume.h"
 #include "recon/mesh_pieces.h"
-#include "recon/spread.h"
 
 namespace rugae {
 namespace {

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/spread.h"
 #include "recon/dense/moving_keyframes.h"
 #include "recon/dense/place_by_patches.h"
-#include "recon/spread.h"
 
 namespace rugae {
 namespace {

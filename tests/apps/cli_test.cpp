@@ -76,7 +76,7 @@ TEST_F(CommandLine, UnknownCommandsAndOptionsOfferTheNearest) {
   expect_refused("simualte",
                  "'simualte': no such command; did you mean 'simulate'?; known: simulate, "
                  "calibrate, reconstruct, "
-                 "evaluate, run, check, picture, list");
+                 "evaluate, run, check, picture, export, list");
   expect_refused("simulate --camrea x --out y",
                  "simulate: unknown option '--camrea'; did you mean '--camera'?");
   expect_refused("simulate --frames=3 --out x --bogus",
@@ -92,7 +92,7 @@ TEST_F(CommandLine, UnknownCommandsAndOptionsOfferTheNearest) {
                  "simulate: --only-frame: '1.5', expected 0, 1, 2 ...; see rugae simulate --help");
   expect_refused("list camera",
                  "list 'camera': no such kind; did you mean 'cameras'?; known: scenes, cameras, "
-                 "rigs, trajectories, studies");
+                 "rigs, trajectories, studies, formats");
 }
 
 TEST_F(CommandLine, MisspeltCameraOffersTheNearest) {
@@ -138,6 +138,23 @@ TEST_F(CommandLine, OutputFolderThatCannotBe) {
   write("file", "x");
   expect_refused("simulate --out file/out",
                  "file/out: output folder cannot be created: Not a directory");
+}
+
+TEST_F(CommandLine, ExportsSayWhatTheirReaderShouldKnow) {
+  small_dataset();
+  const Outcome made = rugae("export data --format nerfstudio --out theirs --json");
+  ASSERT_EQ(made.code, kDone) << made.error;
+  const auto said = nlohmann::json::parse(made.out);
+  EXPECT_EQ(said["frames"], 4);
+  EXPECT_EQ(said["notes"][0], "depth in steps of 0.005 mm: --depth-unit-scale-factor 5e-06");
+  EXPECT_TRUE(fs::exists(folder_ / "theirs" / "transforms.json"));
+  expect_refused("export data --format nerfstudoi --out other",
+                 "format 'nerfstudoi': no such format; did you mean 'nerfstudio'?; known: tum, "
+                 "colmap, nerfstudio, c3vd");
+  expect_refused("export data --format tum --out theirs",
+                 "theirs: holds an export of another dataset, or in another format; choose "
+                 "another folder or remove it");
+  EXPECT_NE(rugae("list formats").out.find("c3vd"), std::string::npos);
 }
 
 TEST_F(CommandLine, DamagedDatasetsAreNamed) {

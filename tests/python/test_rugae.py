@@ -146,6 +146,15 @@ class RugaeTest(unittest.TestCase):
     def test_check(self):
         self.assertEqual(rugae.check(self.dataset_path), [])
 
+    def test_export(self):
+        with tempfile.TemporaryDirectory() as folder:
+            notes = rugae.export(self.dataset_path, "tum", folder + "/tum")
+            self.assertTrue(any("depth factor is 5000" in note for note in notes), notes)
+            poses = np.loadtxt(folder + "/tum/groundtruth.txt")
+            np.testing.assert_allclose(poses[:, 1:4], 1e-3 * self.dataset.world_from_camera[:, :3, 3], rtol=0, atol=1e-12)
+            with self.assertRaisesRegex(rugae.Error, "did you mean 'tum'"):
+                rugae.export(self.dataset_path, "tun", folder + "/other")
+
     def test_estimate(self):
         e = self.estimate
         self.assertEqual((len(e), e.method, e.numbers["keyframes"]), (6, "test", 5.0))

@@ -1,0 +1,109 @@
+// nerfstudio. Camera axes are OpenGL's: x right, y up, z back. Pixel centres are ours.
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+
+#include "core/in_lots.h"
+#include "core/mesh_io.h"
+#include "dataset/export/formats.h"
+#include "dataset/export/points.h"
+#include "dataset/image_io.h"
+
+namespace rugae {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDepthPerMm = 200.0;  // up to 327 mm in 16 bits
+constexpr double kMetresPerMm = 1e-3;
+
+// Columns of y and z negated: the camera's axes, not the world's.
+Json opengl_matrix(const Rigid3& world_from_camera) {
+  const auto m = world_from_camera.matrix3x4();
+  Json rows = Json::array();
+  for (int i = 0; i < 3; ++i) rows.push_back({m(i, 0), -m(i, 1), -m(i, 2), kMetresPerMm * m(i, 3)});
+  rows.push_back({0.0, 0.0, 0.0, 1.0});
+  return rows;
+}
+
+Json camera_of(const Lens& lens) {
+  const bool fisheye = lens.model == LensModel::kannala_brandt;
+  Json camera = {{"camera_model", fisheye ? "OPENCV_FISHEYE" : "OPENCV"},
+                 {"w", lens.width},
+                 {"h", lens.height},
+                 {"fl_x", lens.fx},
+                 {"fl_y", lens.fy},
+                 {"cx", lens.cx},
+                 {"cy", lens.cy},
+                 {"k1", lens.k1},
+                 {"k2", lens.k2},
+                 {"k3", lens.k3}};
+  if (fisheye)
+    camera["k4"] = lens.k4;
+  else
+    camera.update({{"p1", lens.p1}, {"p2", lens.p2}});
+  return camera;
+}
+
+cv::Mat stop_mask(const Lens& lens) {
+  cv::Mat mask(lens.height, lens.width, CV_8U, cv::Scalar(0));
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x < mask.cols; ++x)
+      if (lens.passes_stop({x + 0.5, y + 0.5})) mask.at<uchar>(y, x) = 255;
+  return mask;
+}
+
+// Where splats begin.
+TriangleMesh points_in_metres(const WallPoints& wall) {
+  TriangleMesh points;
+  for (const WallPoint& point : wall.points()) {
+    points.vertices.push_back(kMetresPerMm * point.place_mm);
+    points.colors.push_back(Vec3f(point.color[0], point.color[1], point.color[2]) / 255.0f);
+  }
+  return points;
+}
+
+}  // namespace
+
+std::vector<std::string> export_nerfstudio(const ExportSource& source, Progress& progress) {
+  const bool depth = source.info.truth.labels.depth;
+  const bool stopped = source.lens().stop.shape != StopShape::full;
+  const double per_mm = source.depth_per_mm > 0.0 ? source.depth_per_mm : kDepthPerMm;
+  make_folder(source.out / "images");
+  if (depth) make_folder(source.out / "depth");
+  if (stopped) write_image(source.out / "mask.png", stop_mask(source.lens()));
+  std::vector<std::string> names(source.frames());
+  progress.begin("frames", names.size());
+  do_in_lots(names.size(), kExportLot, progress, [&](std::size_t i) {
+    const int frame = static_cast<int>(i);
+    const std::string stem = fmt::format("{:06}", frame);
+    names[i] = copy_frame(source, frame, source.out / "images" / stem);
+    if (!depth) return;
+    write_once(source.out / "depth" / (stem + ".png"), [&](const auto& file) {
+      write_image(file, coded_depth(source.truth.depth_mm(frame), per_mm));
+    });
+  });
+
+  const WallPoints wall(source, progress);
+  progress.begin("transforms.json");
+  Json transforms = camera_of(source.lens());
+  if (!wall.points().empty()) {
+    write_ply(source.out / "points.ply", points_in_metres(wall));
+    transforms["ply_file_path"] = "points.ply";
+  }
+  for (int frame = 0; frame < source.frames(); ++frame) {
+    Json entry = {{"file_path", "images/" + names[frame]},
+                  {"transform_matrix", opengl_matrix(source.world_from_camera(frame))}};
+    if (depth) entry["depth_file_path"] = fmt::format("depth/{:06}.png", frame);
+    if (stopped) entry["mask_path"] = "mask.png";
+    transforms["frames"].push_back(std::move(entry));
+  }
+  write_atomic(source.out / "transforms.json", transforms.dump(1) + "\n");
+  if (!depth) return {"the dataset has no depth: no depth/"};
+  return {fmt::format("depth in steps of {:.4g} mm: --depth-unit-scale-factor {:.9g}", 1.0 / per_mm,
+                      kMetresPerMm / per_mm)};
+}
+
+}  // namespace rugae
