@@ -173,20 +173,38 @@ void add_reconstruct(CLI::App& app) {
 void add_evaluate(CLI::App& app) {
   struct Arguments {
     fs::path dataset, estimate, out;
+    ForeignFiles files;  // of another program
     bool json = false;
   };
   const auto a = std::make_shared<Arguments>();
   CLI::App& command =
       *app.add_subcommand("evaluate", "Measure an estimate against the exact truth");
   command.add_option("dataset", a->dataset, "The dataset with its truth")->required();
-  command.add_option("estimate", a->estimate, "What reconstruct wrote")->required();
+  command.add_option("estimate", a->estimate,
+                     "What reconstruct wrote, or a trajectory of another program: TUM, "
+                     "world_from_camera, at the frames' times");
+  command.add_option("--map", a->files.map, "Its map: any mesh, in the trajectory's world");
+  command.add_option("--mm-per-unit", a->files.mm_per_unit, "Of trajectory and map")
+      ->capture_default_str();
+  command.add_option("--depth", a->files.depth,
+                     "Its depth along z: a folder of EXR or 16-bit PNG named by their frames");
+  command
+      .add_option("--depth-scale", a->files.depth_mm_per_unit,
+                  "Millimetres per unit of the depth files")
+      ->capture_default_str();
   command.add_option("--out", a->out, "metrics.json");
   add_json_flag(command, a->json);
   command.callback([a] {
     if (a->out.has_parent_path()) make_folder(a->out.parent_path());
     Progress::catch_interrupts();
     Progress progress;
-    const nlohmann::json metrics = evaluate(a->dataset, a->estimate, progress);
+    const bool ours = fs::is_directory(a->estimate);
+    check(!ours || (a->files.map.empty() && a->files.depth.empty()),
+          "{}: an estimate has its own map and depth; --map and --depth go with a trajectory",
+          a->estimate.string());
+    if (!ours) a->files.trajectory = a->estimate;
+    const nlohmann::json metrics = ours ? evaluate(a->dataset, a->estimate, progress)
+                                        : evaluate(a->dataset, a->files, progress);
     if (!a->out.empty()) write_atomic(a->out, metrics.dump(2) + "\n");
     print(a->json, metrics, summary_text(metrics));
   });

@@ -32,9 +32,15 @@ std::string summary_text(const json& metrics) {
   text +=
       fmt::format("path, SE(3)        ATE {}, {} mm a map unit\n",
                   number(path, "ate_se3_rmse_mm", " mm"), number(path, "scale_mm_per_unit", ""));
-  text += fmt::format("depth              AbsRel {} (median scaled {})\n",
-                      number(metrics.at("depth").value("sim3", json()), "abs_rel", ""),
-                      number(metrics.at("depth").value("median_scaled", json()), "abs_rel", ""));
+  const json& depth = metrics.at("depth");
+  const auto abs_rel = [&](const char* which) {
+    return number(depth.value(which, json()), "abs_rel", "");
+  };
+  text += fmt::format("depth              AbsRel {} (median scaled {})\n", abs_rel("sim3"),
+                      abs_rel("median_scaled"));
+  if (depth.contains("as_given"))
+    text += fmt::format("depth, in mm       AbsRel {}, RMSE {}\n", abs_rel("as_given"),
+                        number(depth.at("as_given"), "rmse_mm", " mm"));
   for (const auto& [key, name] : {std::pair{"trajectory_aligned", "map, by the path "},
                                   {"icp_aligned", "map, by ICP      "}}) {
     const json& aligned = surface.at(key);

@@ -9,6 +9,7 @@
 
 #include "core/check.h"
 #include "core/files.h"
+#include "dataset/foreign_estimate.h"
 #include "dataset/image_io.h"
 #include "dataset/observations.h"
 
@@ -110,18 +111,7 @@ PlainFolder PlainFolder::open(const fs::path& root, const PlainFolderOptions& op
 }
 
 cv::Mat PlainFolder::depth_mm(std::size_t index) const {
-  const fs::path& file = depth_files.at(index);
-  cv::Mat depth;
-  if (lower_extension(file) == ".exr") {
-    depth = read_any_exr(file);
-    if (depth.channels() > 1) cv::extractChannel(depth, depth, 0);
-  } else {
-    depth = read_image_as_stored(file);
-    check(depth.type() == CV_16UC1, "{}: depth is stored as {}, expected 16-bit of one channel",
-          file.string(), cv::typeToString(depth.type()));
-  }
-  depth.convertTo(depth, CV_32F, depth_scale);
-  return depth;
+  return read_foreign_depth_mm(depth_files.at(index), depth_scale);
 }
 
 cv::Mat PlainFolder::flow_px(std::size_t index) const {

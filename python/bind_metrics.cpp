@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "core/check.h"
 #include "core/sim3.h"
 #include "python/arrays.h"
 #include "validate/evaluate.h"
@@ -18,12 +19,21 @@ py::object fit(const Doubles& source, const Doubles& target, bool with_scale) {
                         py::array_t<double>(3, transform->translation.data()));
 }
 
-py::object metrics(const std::string& dataset, const std::string& estimate) {
+py::object metrics(const std::string& dataset, const std::string& estimate, const std::string& map,
+                   const std::string& depth, double mm_per_unit, double depth_mm_per_unit) {
   std::string text;
   {
     py::gil_scoped_release others_may_run;
     Progress silent(Progress::Output::silent);
-    text = evaluate(dataset, estimate, silent).dump();
+    const bool ours = std::filesystem::is_directory(estimate);
+    check(!ours || (map.empty() && depth.empty()),
+          "{}: an estimate has its own map and depth; map and depth go with a trajectory",
+          estimate);
+    const nlohmann::json found =
+        ours ? evaluate(dataset, std::filesystem::path(estimate), silent)
+             : evaluate(dataset, ForeignFiles{estimate, map, depth, mm_per_unit, depth_mm_per_unit},
+                        silent);
+    text = found.dump();
   }
   return py::module_::import("json").attr("loads")(text);
 }
@@ -35,8 +45,12 @@ void bind_metrics(py::module_& module) {
       "umeyama", &fit, py::arg("source"), py::arg("target"), py::arg("with_scale") = true,
       "(scale, rotation (3, 3), translation (3,)) that brings source points (n, 3) to the "
       "target's: target = scale * rotation @ source + translation. None when not determined.");
-  module.def("evaluate", &metrics, py::arg("dataset"), py::arg("estimate"),
-             "Every metric of an estimate against the truth, as nested dictionaries.");
+  module.def("evaluate", &metrics, py::arg("dataset"), py::arg("estimate") = "",
+             py::arg("map") = "", py::arg("depth") = "", py::arg("mm_per_unit") = 1.0,
+             py::arg("depth_mm_per_unit") = 1.0,
+             "Every metric of an estimate against the truth, as nested dictionaries. The estimate "
+             "is a folder of ours or another program's trajectory (TUM), which may have a map (a "
+             "mesh) and depth (a folder); or depth alone. Lengths times mm_per_unit.");
 }
 
 }  // namespace rugae::python

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <map>
 #include <thread>
 
 #include "core/check.h"
 #include "core/files.h"
 #include "dataset/estimate.h"
+#include "dataset/foreign_estimate.h"
 #include "dataset/layout.h"
 #include "dataset/observations.h"
 #include "dataset/ply_io.h"
@@ -20,8 +20,6 @@ namespace rugae {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kTimeShare = 0.01;  // of the time between frames, that a pose's time may be off
 
 const std::vector<std::string> kWords = {"frames", "frame_list", "calibration", "out"};
 
@@ -55,37 +53,6 @@ void check_success(const std::string& program, const Ended& ended, const fs::pat
        said.empty() ? ", empty" : ", the last line: " + said);
 }
 
-// The frame whose time is that of the pose.
-std::size_t frame_at(double time_s, const std::vector<double>& times_s, const fs::path& file) {
-  const auto distance = [time_s](double t) { return std::abs(t - time_s); };
-  const auto nearest = std::ranges::min_element(times_s, {}, distance);
-  const double step_s = times_s.size() > 1 ? (times_s.back() - times_s.front()) /
-                                                 static_cast<double>(times_s.size() - 1)
-                                           : 1.0;
-  check(distance(*nearest) <= kTimeShare * step_s,
-        "{}: a pose at {} s, expected the times of frames, the nearest is {} s", file.string(),
-        time_s, *nearest);
-  return static_cast<std::size_t>(nearest - times_s.begin());
-}
-
-Estimate estimate_from(const fs::path& results, const Observations& observations) {
-  Estimate e;
-  e.lens = observations.lens();
-  for (int i = 0; i < observations.size(); ++i) e.times_s.push_back(observations.time_s(i));
-  e.states.assign(e.times_s.size(), FrameState::lost);
-  e.world_from_camera.assign(e.times_s.size(), Rigid3{});
-  const fs::path trajectory = results / "trajectory.txt";
-  for (const TimedPose& pose : read_tum(trajectory)) {
-    const std::size_t frame = frame_at(pose.time_s, e.times_s, trajectory);
-    check(e.states[frame] == FrameState::lost, "{}: two poses at {} s", trajectory.string(),
-          pose.time_s);
-    e.states[frame] = FrameState::resected;
-    e.world_from_camera[frame] = pose.world_from_camera;
-  }
-  if (fs::exists(results / "map.ply")) e.map = read_ply(results / "map.ply");
-  return e;
-}
-
 }  // namespace
 
 void ExternalMethod::check(const std::string& where) const {
@@ -117,7 +84,9 @@ void reconstruct_by(const ExternalMethod& method, const fs::path& dataset,
   progress.begin(method.name);
   const Ended ended = run(command, log, progress);
   check_success(command[0], ended, log);
-  Estimate made = estimate_from(results, observations);
+  Estimate made = estimate_of_trajectory(results / "trajectory.txt", observations.times_s(), 1.0);
+  made.lens = observations.lens();
+  if (fs::exists(results / "map.ply")) made.map = read_ply(results / "map.ply");
   made.method = method.name;
   made.stages = {{method.name, ended.seconds, ended.peak_rss_mb}};
   made.path_s = ended.seconds;

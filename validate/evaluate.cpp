@@ -10,6 +10,8 @@
 
 #include "core/check.h"
 #include "core/in_lots.h"
+#include "core/mesh_io.h"
+#include "dataset/foreign_estimate.h"
 #include "dataset/image_io.h"
 #include "validate/metrics_json.h"
 #include "validate/wall_seen.h"
@@ -22,20 +24,27 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kFramesAtOnce = 16;  // whose depth is read side by side
 
+// An estimate and where its depth comes from.
+struct Measured {
+  Estimate estimate;
+  std::string name;                        // for messages
+  std::function<cv::Mat(int)> depth = {};  // of a frame, in the estimate's units; empty where none
+  bool depth_is_mm = false;                // of a foreign one
+};
+
 // The tracked poses at the times of the truth: frames are the same by index, and must be so by
 // time.
 PoseTrack track_at_true_times(const Truth& truth, const Estimate& estimate,
-                              const fs::path& folder) {
+                              const std::string& name) {
   check(static_cast<int>(estimate.states.size()) == truth.size(),
-        "{}: an estimate of {} frames, the dataset has {}", folder.string(), estimate.states.size(),
+        "{}: an estimate of {} frames, the dataset has {}", name, estimate.states.size(),
         truth.size());
   PoseTrack track;
   for (int i = 0; i < truth.size(); ++i) {
     const double time_s = truth.track()[i].time_s;
     constexpr double kSameTime_s = 1e-6;
     check(std::abs(estimate.times_s[i] - time_s) <= kSameTime_s,
-          "{}: frame {} is at {} s, in the dataset at {} s", folder.string(), i,
-          estimate.times_s[i], time_s);
+          "{}: frame {} is at {} s, in the dataset at {} s", name, i, estimate.times_s[i], time_s);
     if (estimate.states[i] != FrameState::lost)
       track.push_back({time_s, estimate.world_from_camera[i]});
   }
@@ -105,31 +114,39 @@ json frames_json(const Truth& truth, const Estimate& estimate, const PoseErrors&
           {"truth_mm", true_mm}, {"estimate_mm", aligned_mm},     {"state", state}};
 }
 
-json depth_errors(const Truth& truth, const Estimate& estimate, const EstimateLayout& layout,
-                  const PoseErrors& poses, Progress& progress) {
+json depth_errors(const Truth& truth, const Measured& measured, const PoseErrors& poses,
+                  Progress& progress) {
   struct OfFrame {
-    std::optional<DepthError> metric, by_median;
+    std::optional<DepthError> metric, by_median, as_given;
   };
-  std::vector<DepthError> metric, by_median;
+  std::vector<DepthError> metric, by_median, as_given;
   make_in_lots(
       static_cast<std::size_t>(truth.size()), kFramesAtOnce, progress,
       [&](std::size_t i) {
         OfFrame errors;
         const int frame = static_cast<int>(i);
-        if (estimate.states[i] != FrameState::keyframe || !fs::exists(layout.depth(frame)))
-          return errors;
-        const cv::Mat estimated = read_exr(layout.depth(frame)), true_mm = truth.depth_mm(frame);
+        const cv::Mat estimated = measured.depth(frame);
+        if (estimated.empty()) return errors;
+        const cv::Mat true_mm = truth.depth_mm(frame);
+        check(estimated.size() == true_mm.size(),
+              "{}: depth of frame {} is {} x {}, the frames are {} x {}", measured.name, frame,
+              estimated.cols, estimated.rows, true_mm.cols, true_mm.rows);
         if (poses.sim3)
           errors.metric = depth_error(estimated, true_mm, poses.sim3->truth_from_estimate.scale);
         if (const auto scale = median_scale(estimated, true_mm))
           errors.by_median = depth_error(estimated, true_mm, *scale);
+        if (measured.depth_is_mm) errors.as_given = depth_error(estimated, true_mm, 1.0);
         return errors;
       },
       [&](std::size_t, const OfFrame& errors) {  // means add up in the order of frames
         if (errors.metric) metric.push_back(*errors.metric);
         if (errors.by_median) by_median.push_back(*errors.by_median);
+        if (errors.as_given) as_given.push_back(*errors.as_given);
       });
-  return {{"sim3", depth_json(mean_of(metric))}, {"median_scaled", depth_json(mean_of(by_median))}};
+  json out = {{"sim3", depth_json(mean_of(metric))},
+              {"median_scaled", depth_json(mean_of(by_median))}};
+  if (measured.depth_is_mm) out["as_given"] = depth_json(mean_of(as_given));
+  return out;
 }
 
 json coverage_json(const Visibility& visibility) {
@@ -164,9 +181,12 @@ json surface_not_measured(const std::string& note) {
 // The map against the wall that was seen: placed by the trajectory, then by ICP from there.
 json surface_errors(const Estimate& estimate, const TriangleMesh& seen, const PoseErrors& poses) {
   json out = surface_not_measured("");
-  if (estimate.map.empty()) out["note"] = "the estimate has no map";
-  if (!poses.sim3) out["note"] = "the map cannot be placed: " + poses.note;
-  if (seen.empty()) out["note"] = "no part of the wall was seen";
+  if (seen.empty())
+    out["note"] = "no part of the wall was seen";
+  else if (estimate.map.empty())
+    out["note"] = "the estimate has no map";
+  else if (!poses.sim3)
+    out["note"] = "the map cannot be placed: " + poses.note;
   if (out["note"] != "") return out;
   const TriangleMesh placed = transformed(estimate.map, poses.sim3->truth_from_estimate);
   const TrueSurface truth(seen);
@@ -194,12 +214,9 @@ json surface_errors(const Estimate& estimate, const TriangleMesh& seen, const Po
   return out;
 }
 
-}  // namespace
-
-json evaluate(const fs::path& dataset, const fs::path& estimate_folder, Progress& progress) {
-  const Truth truth = Truth::open(dataset);
-  const Estimate estimate = read_estimate(estimate_folder);
-  const PoseTrack track = track_at_true_times(truth, estimate, estimate_folder);
+json metrics_of(const Truth& truth, const Measured& measured, Progress& progress) {
+  const Estimate& estimate = measured.estimate;
+  const PoseTrack track = track_at_true_times(truth, estimate, measured.name);
 
   json out;
   progress.begin("evaluate: path");
@@ -223,7 +240,7 @@ json evaluate(const fs::path& dataset, const fs::path& estimate_folder, Progress
   }
 
   progress.begin("evaluate: depth", truth.size());
-  out["depth"] = depth_errors(truth, estimate, EstimateLayout{estimate_folder}, poses, progress);
+  out["depth"] = depth_errors(truth, measured, poses, progress);
   progress.end();
 
   progress.begin("evaluate: wall seen", truth.size());
@@ -237,6 +254,59 @@ json evaluate(const fs::path& dataset, const fs::path& estimate_folder, Progress
   out["surface"] = surface_errors(estimate, visibility.seen_wall(), poses);
   progress.end();
   return out;
+}
+
+}  // namespace
+
+json evaluate(const fs::path& dataset, const fs::path& estimate_folder, Progress& progress) {
+  const Truth truth = Truth::open(dataset);
+  Measured measured{read_estimate(estimate_folder), estimate_folder.string()};
+  const EstimateLayout layout{estimate_folder};
+  measured.depth = [&](int frame) {
+    const bool keyframe = measured.estimate.states[frame] == FrameState::keyframe;
+    return keyframe && fs::exists(layout.depth(frame)) ? read_exr(layout.depth(frame)) : cv::Mat();
+  };
+  return metrics_of(truth, measured, progress);
+}
+
+void ForeignFiles::check() const {
+  rugae::check(
+      !trajectory.empty() || !depth.empty(),
+      "neither a path nor depth to measure: expected an estimate's folder, a trajectory in "
+      "TUM format, or depth");
+  rugae::check(map.empty() || !trajectory.empty(),
+               "{}: a map is placed by the trajectory, which is missing", map.string());
+  rugae::check(mm_per_unit > 0.0 && std::isfinite(mm_per_unit),
+               "mm-per-unit is {}, expected above 0", mm_per_unit);
+  rugae::check(depth_mm_per_unit > 0.0 && std::isfinite(depth_mm_per_unit),
+               "depth-scale is {}, expected above 0", depth_mm_per_unit);
+}
+
+json evaluate(const fs::path& dataset, const ForeignFiles& files, Progress& progress) {
+  files.check();
+  const Truth truth = Truth::open(dataset);
+  std::vector<double> times_s;
+  for (const TimedPose& pose : truth.track()) times_s.push_back(pose.time_s);
+  Measured measured;
+  measured.name = (files.trajectory.empty() ? files.depth : files.trajectory).string();
+  Estimate& estimate = measured.estimate;
+  if (files.trajectory.empty()) {
+    estimate.times_s = times_s;
+    estimate.states.assign(times_s.size(), FrameState::lost);
+    estimate.world_from_camera.resize(times_s.size());
+  } else {
+    estimate = estimate_of_trajectory(files.trajectory, times_s, files.mm_per_unit);
+  }
+  if (!files.map.empty()) estimate.map = read_mesh(files.map, files.mm_per_unit);
+  std::map<int, fs::path> depth;
+  if (!files.depth.empty()) depth = foreign_depth_files(files.depth, truth.size());
+  measured.depth_is_mm = !depth.empty();
+  measured.depth = [&](int frame) {
+    const auto file = depth.find(frame);
+    return file == depth.end() ? cv::Mat()
+                               : read_foreign_depth_mm(file->second, files.depth_mm_per_unit);
+  };
+  return metrics_of(truth, measured, progress);
 }
 
 }  // namespace rugae

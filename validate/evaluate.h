@@ -2,7 +2,9 @@
 // All metrics of an estimate against the truth, and their JSON.
 
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json_fwd.hpp>
+#include <opencv2/core/mat.hpp>
 #include <string>
 
 #include "core/progress.h"
@@ -15,6 +17,21 @@ namespace rugae {
 /// {"trajectory": {"ate_sim3_rmse_mm": ...}, "depth": {...}, "surface": {...}, "tracking": {...},
 /// "time": {...}}.
 nlohmann::json evaluate(const std::filesystem::path& dataset, const std::filesystem::path& estimate,
+                        Progress& progress);
+
+/// What another program estimated; what is empty is not measured.
+struct ForeignFiles {
+  std::filesystem::path trajectory = {};  // TUM, world_from_camera, at the frames' times
+  std::filesystem::path map = {};         // any mesh file, in the trajectory's world
+  std::filesystem::path depth = {};  // folder: EXR or 16-bit PNG named by their frames, along z
+  double mm_per_unit = 1.0;          // of trajectory and map
+  double depth_mm_per_unit = 1.0;    // of the depth files
+  /// Throws Error naming what is missing, or the field and its value.
+  void check() const;
+};
+
+/// The same metrics of these. Depth has `as_given` beside them: in mm, not scaled.
+nlohmann::json evaluate(const std::filesystem::path& dataset, const ForeignFiles& files,
                         Progress& progress);
 
 }  // namespace rugae

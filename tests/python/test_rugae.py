@@ -146,6 +146,15 @@ class RugaeTest(unittest.TestCase):
     def test_check(self):
         self.assertEqual(rugae.check(self.dataset_path), [])
 
+    def test_evaluate_of_another_program(self):
+        with tempfile.TemporaryDirectory() as folder:
+            rugae.export(self.dataset_path, "tum", folder + "/tum", depth_per_mm=100)
+            m = rugae.evaluate(self.dataset_path, folder + "/tum/groundtruth.txt", mm_per_unit=1000,
+                               depth=folder + "/tum/depth", depth_mm_per_unit=0.01)
+            self.assertLess(m["trajectory"]["ate_se3_rmse_mm"], 1e-6)
+            self.assertLess(m["depth"]["as_given"]["rmse_mm"], 0.005)
+            self.assertEqual(m["depth"]["as_given"]["frames"], len(self.dataset))
+
     def test_export(self):
         with tempfile.TemporaryDirectory() as folder:
             notes = rugae.export(self.dataset_path, "tum", folder + "/tum")

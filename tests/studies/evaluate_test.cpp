@@ -6,6 +6,8 @@
 
 #include "core/check.h"
 #include "core/files.h"
+#include "dataset/image_io.h"
+#include "tests/message_of.h"
 #include "tests/studies/in_temporary_folder.h"
 #include "tests/studies/inside_sphere.h"
 #include "validate/wall_seen.h"
@@ -13,6 +15,7 @@
 namespace rugae {
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::json;
 
 // Meshes are written as 32-bit floats by some writers: 1e-6 of their size.
@@ -123,6 +126,86 @@ TEST_F(Evaluate, TheWallSeenIsThatOfEachFramesOwnDepth) {
   }
   Progress progress(Progress::Output::silent);
   EXPECT_EQ(wall_seen(truth, backwards, progress).seen(), one_by_one.seen());
+}
+
+// The files of an estimate, without what says that they are one.
+TEST_F(Evaluate, TheSameFilesFromAnotherProgramHaveTheSameErrors) {
+  const json ours = metrics(0.05, inside_sphere::kRadius_mm + 1.0);
+  const EstimateLayout layout{folder_ / "estimate"};
+  const ForeignFiles files{layout.trajectory(), layout.map_ply(), layout.depth_folder(), 20.0,
+                           20.0};
+  Progress progress(Progress::Output::silent);
+  const json theirs = evaluate(folder_ / "data", files, progress);
+  const auto expect_near = [](const json& a, const json& b) {
+    ASSERT_EQ(a.size(), b.size());
+    for (const auto& [key, value] : a.items()) {
+      if (!value.is_number()) continue;
+      const double expected = value.get<double>();
+      EXPECT_NEAR(b.at(key).get<double>(), expected, 1e-6 * std::max(1.0, std::abs(expected)))
+          << key;
+    }
+  };
+  EXPECT_EQ(theirs.at("tracking").at("lost"), 1);
+  EXPECT_NEAR(theirs.at("trajectory").at("scale_mm_per_unit").get<double>(), 1.0, 1e-9);
+  EXPECT_TRUE(theirs.at("trajectory").at("ate_se3_rmse_mm").get<double>() <= 1e-9);  // in mm now
+  expect_near(ours.at("surface").at("trajectory_aligned"),
+              theirs.at("surface").at("trajectory_aligned"));
+  expect_near(ours.at("depth").at("sim3"), theirs.at("depth").at("sim3"));
+  expect_near(ours.at("depth").at("median_scaled"), theirs.at("depth").at("median_scaled"));
+  EXPECT_TRUE(theirs.at("depth").at("as_given").at("abs_rel").get<double>() <= 1e-6);
+  EXPECT_EQ(theirs.at("depth").at("as_given").at("frames"), 4);
+  EXPECT_FALSE(ours.at("depth").contains("as_given"));
+}
+
+TEST_F(Evaluate, DepthAloneIsMeasuredAndSoIsItsScale) {
+  metrics(1.0);
+  const fs::path depth = folder_ / "predicted";
+  make_folder(depth);
+  const Truth truth = Truth::open(folder_ / "data");
+  for (const int frame : {2, 7}) {  // half a step is 0.005 mm of 20 mm and more
+    cv::Mat hundredths;
+    truth.depth_mm(frame).convertTo(hundredths, CV_16U, 100.0 * 1.1);
+    write_image(depth / fmt::format("frame_{}.png", frame), hundredths);
+  }
+  Progress progress(Progress::Output::silent);
+  const json m =
+      evaluate(folder_ / "data", ForeignFiles{.depth = depth, .depth_mm_per_unit = 0.01}, progress);
+  EXPECT_NEAR(m.at("depth").at("as_given").at("abs_rel").get<double>(), 0.1, 1e-3);
+  EXPECT_TRUE(m.at("depth").at("median_scaled").at("abs_rel").get<double>() <= 1e-3);
+  EXPECT_TRUE(m.at("depth").at("sim3").is_null());
+  EXPECT_EQ(m.at("depth").at("as_given").at("frames"), 2);
+  EXPECT_EQ(m.at("tracking").at("tracked"), 0);
+  EXPECT_EQ(m.at("surface").at("note"), "the estimate has no map");
+}
+
+TEST_F(Evaluate, ForeignFilesThatDoNotFitAreNamed) {
+  metrics(1.0);
+  Progress progress(Progress::Output::silent);
+  const auto refused = [&](const ForeignFiles& files) {
+    return message_of([&] { evaluate(folder_ / "data", files, progress); });
+  };
+  const std::string trajectory = (folder_ / "estimate" / "trajectory.txt").string();
+  const fs::path depth = folder_ / "predicted";
+  make_folder(depth);
+  EXPECT_EQ(refused({.depth = depth}), depth.string() + ": no files .exr, .png in this folder");
+  write_exr(depth / "a12.exr", cv::Mat(4, 4, CV_32F, cv::Scalar(1.0)));
+  EXPECT_EQ(refused({.depth = depth}),
+            (depth / "a12.exr").string() + ": frame 12, the dataset has 0 to 11");
+  fs::rename(depth / "a12.exr", depth / "a3.exr");
+  EXPECT_EQ(refused({.depth = depth}),
+            depth.string() + ": depth of frame 3 is 4 x 4, the frames are 96 x 72");
+  fs::rename(depth / "a3.exr", depth / "a3_16bit.exr");
+  EXPECT_EQ(refused({.depth = depth}),
+            (depth / "a3_16bit.exr").string() + ": expected one number in the name, its frame's");
+  EXPECT_EQ(refused({.trajectory = trajectory, .mm_per_unit = -1.0}),
+            "mm-per-unit is -1, expected above 0");
+  EXPECT_EQ(refused({.map = "map.ply", .depth = depth}),
+            "map.ply: a map is placed by the trajectory, which is missing");
+  write_atomic(folder_ / "late.txt", "0.02 0 0 0 0 0 0 1\n");
+  EXPECT_EQ(refused({.trajectory = folder_ / "late.txt"}),
+            (folder_ / "late.txt").string() +
+                ": a pose at 0.02 s, expected the times of frames, the nearest is "
+                "0.03333333333333333 s");
 }
 
 TEST_F(Evaluate, AnEstimateOfOtherFramesIsAnError) {
