@@ -51,6 +51,14 @@ std::string marker_of(const ExportSource& source, const ExportOptions& options) 
   return marker.dump(2) + "\n";
 }
 
+// What is in a dataset's folder but none of it would make it unsound.
+void check_is_outside(const fs::path& out, const fs::path& dataset) {
+  const fs::path inner = fs::weakly_canonical(out), outer = fs::weakly_canonical(dataset);
+  const auto differ = std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end());
+  check(differ.first != outer.end(), "{}: lies in the dataset, expected a folder outside of it",
+        out.string());
+}
+
 void take_folder(const fs::path& out, const std::string& marker) {
   make_folder(out);
   const fs::path file = out / "export.json";
@@ -93,6 +101,7 @@ ExportReport export_dataset(const fs::path& dataset, const ExportOptions& option
   source.info = read_info(source.layout.info());
   source.out = out;
   source.depth_per_mm = options.depth_per_mm;
+  check_is_outside(out, dataset);
   take_folder(out, marker_of(source, options));
 
   ExportReport report{source.frames(), format_named(options.format).write(source, progress)};

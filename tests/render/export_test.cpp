@@ -380,6 +380,10 @@ TEST_F(Export, GoesOnWhereItStoppedAndTakesNoOtherFolder) {
   EXPECT_EQ(refused(root_ / "mine", {"tum"}, root_ / "new"),
             (root_ / "mine").string() + ": not a dataset (no dataset.json)");
   EXPECT_FALSE(fs::exists(root_ / "new"));
+  const fs::path inside = polynomial() / "tum";
+  EXPECT_EQ(refused(polynomial(), {"tum"}, inside),
+            inside.string() + ": lies in the dataset, expected a folder outside of it");
+  EXPECT_FALSE(fs::exists(inside));
 }
 
 }  // namespace
