@@ -6,7 +6,6 @@
 #include <fstream>
 
 #include "core/check.h"
-#include "core/in_lots.h"
 #include "dataset/export/formats.h"
 #include "dataset/export/points.h"
 
@@ -56,16 +55,9 @@ class LongText {
 }  // namespace
 
 std::vector<std::string> export_colmap(const ExportSource& source, Progress& progress) {
-  const fs::path images = source.out / "images", sparse = source.out / "sparse" / "0";
-  make_folder(images);
+  const fs::path sparse = source.out / "sparse" / "0";
   make_folder(sparse);
-  std::vector<std::string> names(source.frames());
-  progress.begin("frames", names.size());
-  do_in_lots(names.size(), kExportLot, progress, [&](std::size_t i) {
-    const int frame = static_cast<int>(i);
-    names[i] = copy_frame(source, frame, images / fmt::format("{:06}", frame));
-  });
-
+  const auto names = write_frames(source, "images", 0.0, progress);
   const WallPoints wall(source, progress);
   progress.begin("sparse model", names.size());
   std::vector<std::string> tracks(wall.points().size());  // "image, its how manieth point" each

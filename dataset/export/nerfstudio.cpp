@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "core/in_lots.h"
 #include "core/mesh_io.h"
 #include "dataset/export/formats.h"
 #include "dataset/export/points.h"
@@ -71,20 +70,8 @@ std::vector<std::string> export_nerfstudio(const ExportSource& source, Progress&
   const bool depth = source.info.truth.labels.depth;
   const bool stopped = source.lens().stop.shape != StopShape::full;
   const double per_mm = source.depth_per_mm > 0.0 ? source.depth_per_mm : kDepthPerMm;
-  make_folder(source.out / "images");
-  if (depth) make_folder(source.out / "depth");
+  const auto names = write_frames(source, "images", depth ? per_mm : 0.0, progress);
   if (stopped) write_image(source.out / "mask.png", stop_mask(source.lens()));
-  std::vector<std::string> names(source.frames());
-  progress.begin("frames", names.size());
-  do_in_lots(names.size(), kExportLot, progress, [&](std::size_t i) {
-    const int frame = static_cast<int>(i);
-    const std::string stem = fmt::format("{:06}", frame);
-    names[i] = copy_frame(source, frame, source.out / "images" / stem);
-    if (!depth) return;
-    write_once(source.out / "depth" / (stem + ".png"), [&](const auto& file) {
-      write_image(file, coded_depth(source.truth.depth_mm(frame), per_mm));
-    });
-  });
 
   const WallPoints wall(source, progress);
   progress.begin("transforms.json");

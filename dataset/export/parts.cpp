@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/in_lots.h"
+#include "dataset/image_io.h"
+
 namespace rugae {
 
 std::string copy_frame(const ExportSource& source, int frame, const std::filesystem::path& stem) {
@@ -24,6 +27,24 @@ cv::Mat coded_depth(const cv::Mat& depth_mm, double per_mm) {
       code.at<ushort>(y, x) = steps > 0.0 && steps <= kTop ? static_cast<ushort>(steps) : 0;
     }
   return code;
+}
+
+std::vector<std::string> write_frames(const ExportSource& source, const std::string& images,
+                                      double depth_per_mm, Progress& progress) {
+  make_folder(source.out / images);
+  if (depth_per_mm > 0.0) make_folder(source.out / "depth");
+  std::vector<std::string> names(source.frames());
+  progress.begin("frames", names.size());
+  do_in_lots(names.size(), kExportLot, progress, [&](std::size_t i) {
+    const int frame = static_cast<int>(i);
+    const std::string stem = fmt::format("{:06}", frame);
+    names[i] = copy_frame(source, frame, source.out / images / stem);
+    if (!(depth_per_mm > 0.0)) return;
+    write_once(source.out / "depth" / (stem + ".png"), [&](const auto& file) {
+      write_image(file, coded_depth(source.truth.depth_mm(frame), depth_per_mm));
+    });
+  });
+  return names;
 }
 
 std::vector<double> opencv_distortion(const Lens& lens) {

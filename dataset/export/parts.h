@@ -32,7 +32,7 @@ struct ExportSource {
 /// Frames between two steps of the progress line.
 constexpr std::size_t kExportLot = 16;
 
-/// Files appear whole, so one that is there is done.
+/// Files appear whole, so one that is there from an earlier run is done.
 template <typename Write>
 void write_once(const std::filesystem::path& file, Write write) {
   if (!std::filesystem::exists(file)) write(file);
@@ -43,6 +43,11 @@ std::string copy_frame(const ExportSource& source, int frame, const std::filesys
 
 /// CV_16U: depth times `per_mm`, rounded; 0 where it is not known, not above 0, or beyond 65535.
 cv::Mat coded_depth(const cv::Mat& depth_mm, double per_mm);
+
+/// All frames into the folder `images` of the export, and their depth into depth/ where
+/// `depth_per_mm` is above 0. Returns the frames' file names.
+std::vector<std::string> write_frames(const ExportSource& source, const std::string& images,
+                                      double depth_per_mm, Progress& progress);
 
 /// Coefficients in OpenCV's order, which other programs took over: k1 k2 p1 p2 k3, or k1 k2 k3 k4
 /// of a fisheye.

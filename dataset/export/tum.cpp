@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "core/in_lots.h"
 #include "dataset/export/formats.h"
-#include "dataset/image_io.h"
 
 namespace rugae {
 namespace {
@@ -32,19 +30,7 @@ std::string calibration_of(const Lens& lens) {
 std::vector<std::string> export_tum(const ExportSource& source, Progress& progress) {
   const bool depth = source.info.truth.labels.depth;
   const double per_mm = source.depth_per_mm > 0.0 ? source.depth_per_mm : kDepthPerMm;
-  make_folder(source.out / "rgb");
-  if (depth) make_folder(source.out / "depth");
-  std::vector<std::string> images(source.frames());
-  progress.begin("frames", images.size());
-  do_in_lots(images.size(), kExportLot, progress, [&](std::size_t i) {
-    const int frame = static_cast<int>(i);
-    const std::string name = fmt::format("{:06}", frame);
-    images[i] = copy_frame(source, frame, source.out / "rgb" / name);
-    if (!depth) return;
-    write_once(source.out / "depth" / (name + ".png"), [&](const auto& file) {
-      write_image(file, coded_depth(source.truth.depth_mm(frame), per_mm));
-    });
-  });
+  const auto images = write_frames(source, "rgb", depth ? per_mm : 0.0, progress);
 
   const std::string name = fmt::format("{}, {}, trajectory {}", source.info.scene,
                                        source.info.camera, source.info.trajectory);
