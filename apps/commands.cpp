@@ -94,6 +94,7 @@ void add_simulate(CLI::App& app) {
     if (a->clean) render.sensor.noise = false;
     if (a->no_labels) render.labels = false;
     if (a->all_labels) {
+      render.labels = true;
       render.truth.labels = LabelSet::all();
       render.truth.labels.indirect = render.light.bounces > 0;
     }
@@ -184,13 +185,13 @@ void add_evaluate(CLI::App& app) {
                      "What reconstruct wrote, or a trajectory of another program: TUM, "
                      "world_from_camera, at the frames' times");
   command.add_option("--map", a->files.map, "Its map: any mesh, in the trajectory's world");
-  command.add_option("--mm-per-unit", a->files.mm_per_unit, "Of trajectory and map")
+  command.add_option("--mm-per-unit", a->files.mm_per_unit, "Of trajectory, map and depth")
       ->capture_default_str();
   command.add_option("--depth", a->files.depth,
                      "Its depth along z: a folder of EXR or 16-bit PNG named by their frames");
   command
-      .add_option("--depth-scale", a->files.depth_mm_per_unit,
-                  "Millimetres per unit of the depth files")
+      .add_option("--depth-scale", a->files.depth_scale,
+                  "Units (of the trajectory) a step of the depth files")
       ->capture_default_str();
   command.add_option("--out", a->out, "metrics.json");
   add_json_flag(command, a->json);
@@ -199,8 +200,10 @@ void add_evaluate(CLI::App& app) {
     Progress::catch_interrupts();
     Progress progress;
     const bool ours = fs::is_directory(a->estimate);
-    check(!ours || (a->files.map.empty() && a->files.depth.empty()),
-          "{}: an estimate has its own map and depth; --map and --depth go with a trajectory",
+    check(!ours || (a->files.map.empty() && a->files.depth.empty() && a->files.mm_per_unit == 1.0 &&
+                    a->files.depth_scale == 1.0),
+          "{}: an estimate has its own map, depth and unit; --map, --depth and their units go with "
+          "a trajectory",
           a->estimate.string());
     if (!ours) a->files.trajectory = a->estimate;
     const nlohmann::json metrics = ours ? evaluate(a->dataset, a->estimate, progress)

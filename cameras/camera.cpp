@@ -1,6 +1,9 @@
 #include "cameras/camera.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "core/check.h"
 #include "core/portable_math.h"
@@ -151,12 +154,40 @@ double aperture_radius_mm(const Camera& camera) {
   return 0.5 * focal_mm / camera.focus.f_number;
 }
 
+namespace {
+
+// Corners alone do not see a polynomial that dips below 0 between them and the centre.
+void check_fall_off(const Camera& camera, const std::string& where) {
+  constexpr int kSteps = 256;
+  const Lens& lens = camera.lens;
+  double reach_px = 0.0;
+  Vec2 farthest = Vec2::Zero();
+  for (const Vec2& corner :
+       {Vec2(0, 0), Vec2(lens.width, 0), Vec2(0, lens.height), Vec2(lens.width, lens.height)}) {
+    const double distance_px = (corner - Vec2(lens.cx, lens.cy)).norm();
+    if (distance_px > reach_px) reach_px = distance_px, farthest = corner;
+  }
+  Vignetting polynomial = camera.vignetting;
+  polynomial.cos4 = false;
+  for (int i = 0; i <= kSteps; ++i) {
+    const Vec2 pixel = Vec2(lens.cx, lens.cy) +
+                       static_cast<double>(i) / kSteps * (farthest - Vec2(lens.cx, lens.cy));
+    const double light = vignette_at(polynomial, lens, pixel, Vec3::UnitZ());
+    check(light > 0.0, "{}: vignetting is {:.3g} at pixel ({:.1f}, {:.1f}), expected above 0",
+          where, light, pixel.x(), pixel.y());
+  }
+}
+
+}  // namespace
+
 Camera load_camera(const std::string& name_or_path) {
   const auto file = find_preset("cameras", "camera", name_or_path);
   YamlReader yaml = YamlReader::from_file(file);
   Camera camera;
   camera.name = file.stem().string();
   yaml.get("name", camera.name);
+  check(std::ranges::none_of(camera.name, [](unsigned char c) { return std::iscntrl(c) != 0; }),
+        "{}: name has a line break or another control character", yaml.where("name"));
   yaml.get("diameter_mm", camera.diameter_mm);
   yaml.get("frames_in_paper", camera.frames_in_paper);
   check(camera.diameter_mm >= 0.0, "{}: diameter_mm is {}, expected at least 0",
@@ -182,9 +213,12 @@ Camera load_camera(const std::string& name_or_path) {
   yaml.finish();
   const double w = camera.lens.width, h = camera.lens.height;
   for (const Vec2& corner : {Vec2(0, 0), Vec2(w, 0), Vec2(0, h), Vec2(w, h)})
-    check(vignette_at(camera.vignetting, camera.lens, corner) > 0.0,
-          "{}: vignetting leaves no light at the image corner ({}, {})", yaml.where("vignetting"),
-          corner.x(), corner.y());
+    check(!camera.lens.passes_stop(corner) ||
+              vignette_at(camera.vignetting, camera.lens, corner) > 0.0,
+          "{}: vignetting leaves no light at the image corner ({}, {}){}", yaml.where("vignetting"),
+          corner.x(), corner.y(),
+          camera.vignetting.cos4 ? "; a lens that sees beyond 90 degrees has cos4: false" : "");
+  check_fall_off(camera, yaml.where("vignetting"));
   return camera;
 }
 
@@ -256,11 +290,24 @@ std::string lens_yaml(const Lens& lens, const std::string& comment) {
   return calibration_yaml({lens, {}, {}}, comment);
 }
 
+namespace {
+
+// Names that YAML would read as something else stand in quotes.
+std::string quoted(const std::string& name) {
+  const auto plain = [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.' || c == '/';
+  };
+  if (!name.empty() && std::ranges::all_of(name, plain)) return name;
+  return nlohmann::json(name).dump();
+}
+
+}  // namespace
+
 std::string camera_yaml(const Camera& camera) {
   const Vignetting& v = camera.vignetting;
   const Sensor& s = camera.sensor;
   std::string text = fmt::format("name: {}\nframes_in_paper: {}\ndiameter_mm: {:.17g}\nlens:\n",
-                                 camera.name, camera.frames_in_paper, camera.diameter_mm);
+                                 quoted(camera.name), camera.frames_in_paper, camera.diameter_mm);
   text += lens_lines(camera.lens, "  ");
   text += fmt::format("vignetting:\n  cos4: {}\n  v1: {:.17g}\n  v2: {:.17g}\n  v3: {:.17g}\n",
                       v.cos4, v.v1, v.v2, v.v3);

@@ -246,7 +246,7 @@ double vignette_at(const Vignetting& vignetting, const Lens& lens, const Vec2& p
   const double r2 =
       (pixel - Vec2(lens.cx, lens.cy)).squaredNorm() / (half_diagonal * half_diagonal);
   const double polynomial = 1.0 + r2 * (vignetting.v1 + r2 * (vignetting.v2 + r2 * vignetting.v3));
-  const double cos2 = ray.z() * ray.z();
+  const double cos = std::max(ray.z(), 0.0), cos2 = cos * cos;  // behind it no light comes in
   return (vignetting.cos4 ? cos2 * cos2 : 1.0) * polynomial;
 }
 

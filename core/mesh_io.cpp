@@ -110,12 +110,14 @@ TriangleMesh read_mesh(const std::filesystem::path& file, double mm_per_unit) {
   return mesh;
 }
 
-void write_ply(const std::filesystem::path& file, const TriangleMesh& mesh, bool precise) {
+void write_ply(const std::filesystem::path& file, const TriangleMesh& mesh, bool precise,
+               const std::string& unit) {
   const bool with_normals = mesh.normals.size() == mesh.vertices.size() && !mesh.normals.empty();
   const bool with_colors = mesh.colors.size() == mesh.vertices.size() && !mesh.colors.empty();
   const bool with_sigma = mesh.sigma.size() == mesh.vertices.size() && !mesh.sigma.empty();
   const char* real = precise ? "double" : "float";
-  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment lengths in mm\n";
+  std::string bytes =
+      fmt::format("ply\nformat binary_little_endian 1.0\ncomment lengths in {}\n", unit);
   bytes += fmt::format("element vertex {}\n", mesh.vertices.size());
   for (const char* axis : {"x", "y", "z"}) bytes += fmt::format("property {} {}\n", real, axis);
   if (with_normals) bytes += "property float nx\nproperty float ny\nproperty float nz\n";

@@ -60,6 +60,10 @@ int count(const Estimate& estimate, FrameState state) {
   return static_cast<int>(std::ranges::count(estimate.states, state));
 }
 
+std::string length_unit(const Estimate& estimate) {
+  return estimate.scale_sigma_share ? "mm" : "map units";
+}
+
 json info_of(const Estimate& estimate) {
   json stages = json::array();
   for (const StageTime& stage : estimate.stages)
@@ -71,7 +75,7 @@ json info_of(const Estimate& estimate) {
     check(!options.is_discarded(), "the options of the estimate are not JSON: {}",
           estimate.options_json);
   }
-  json units = {{"length", estimate.scale_sigma_share ? "mm" : "map units"}, {"time", "s"}};
+  json units = {{"length", length_unit(estimate)}, {"time", "s"}};
   if (estimate.scale_sigma_share) units["length_sigma_share"] = *estimate.scale_sigma_share;
   return {{"method", estimate.method},
           {"frames", estimate.times_s.size()},
@@ -164,8 +168,9 @@ void write_estimate(const fs::path& root, const Estimate& estimate) {
   write_atomic(layout.lens(), lens_yaml(estimate.lens, "the lens used by the reconstruction"));
   TriangleMesh points;
   points.vertices = estimate.points;
-  write_ply(layout.points(), points, true);
-  write_ply(layout.map_ply(), estimate.map);
+  const std::string unit = length_unit(estimate);
+  write_ply(layout.points(), points, true, unit);
+  write_ply(layout.map_ply(), estimate.map, false, unit);
   if (!estimate.map.empty()) write_glb(layout.map_glb(), estimate.map);
   write_atomic(layout.info(), info);
 }

@@ -13,7 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kTimeShare = 0.01;  // of the time between frames, that a pose's time may be off
+// Of the time between frames, that a pose's time may be off: times are often written in ms.
+constexpr double kTimeShare = 0.05;
 
 // The frame whose time is that of the pose.
 std::size_t frame_at(double time_s, const std::vector<double>& times_s, const fs::path& file) {
@@ -23,8 +24,8 @@ std::size_t frame_at(double time_s, const std::vector<double>& times_s, const fs
                                                  static_cast<double>(times_s.size() - 1)
                                            : 1.0;
   check(distance(*nearest) <= kTimeShare * step_s,
-        "{}: a pose at {} s, expected the times of frames, the nearest is {} s", file.string(),
-        time_s, *nearest);
+        "{}: a pose at {} s, expected the times of frames to within {:.2g} s, the nearest is {} s",
+        file.string(), time_s, kTimeShare * step_s, *nearest);
   return static_cast<std::size_t>(nearest - times_s.begin());
 }
 

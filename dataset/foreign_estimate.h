@@ -11,7 +11,7 @@
 namespace rugae {
 
 /// The poses of a TUM file (world_from_camera, lengths times `mm_per_unit`), each at the time of a
-/// frame to within a hundredth of the time between frames; frames without one are lost. Throws
+/// frame to within a twentieth of the time between frames; frames without one are lost. Throws
 /// Error for other times, and for two poses of one frame.
 Estimate estimate_of_trajectory(const std::filesystem::path& file,
                                 const std::vector<double>& times_s, double mm_per_unit);

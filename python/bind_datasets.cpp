@@ -61,7 +61,9 @@ struct ReadEstimate {
     for (const FrameState state : estimate.states) known.push_back(state != FrameState::lost);
     return to_matrices(estimate.world_from_camera, known);
   }
-  py::object depth(int i) const {
+  py::object depth(int at) const {
+    const int frames = static_cast<int>(estimate.times_s.size()), i = at < 0 ? at + frames : at;
+    if (i < 0 || i >= frames) throw py::index_error("frame " + std::to_string(at));
     if (!std::filesystem::exists(layout.depth(i))) return py::none();
     return to_array(read_exr(layout.depth(i)));
   }

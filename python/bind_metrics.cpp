@@ -20,18 +20,19 @@ py::object fit(const Doubles& source, const Doubles& target, bool with_scale) {
 }
 
 py::object metrics(const std::string& dataset, const std::string& estimate, const std::string& map,
-                   const std::string& depth, double mm_per_unit, double depth_mm_per_unit) {
+                   const std::string& depth, double mm_per_unit, double depth_scale) {
   std::string text;
   {
     py::gil_scoped_release others_may_run;
     Progress silent(Progress::Output::silent);
     const bool ours = std::filesystem::is_directory(estimate);
-    check(!ours || (map.empty() && depth.empty()),
-          "{}: an estimate has its own map and depth; map and depth go with a trajectory",
+    check(!ours || (map.empty() && depth.empty() && mm_per_unit == 1.0 && depth_scale == 1.0),
+          "{}: an estimate has its own map, depth and unit; map, depth and their units go with a "
+          "trajectory",
           estimate);
     const nlohmann::json found =
         ours ? evaluate(dataset, std::filesystem::path(estimate), silent)
-             : evaluate(dataset, ForeignFiles{estimate, map, depth, mm_per_unit, depth_mm_per_unit},
+             : evaluate(dataset, ForeignFiles{estimate, map, depth, mm_per_unit, depth_scale},
                         silent);
     text = found.dump();
   }
@@ -47,10 +48,11 @@ void bind_metrics(py::module_& module) {
       "target's: target = scale * rotation @ source + translation. None when not determined.");
   module.def("evaluate", &metrics, py::arg("dataset"), py::arg("estimate") = "",
              py::arg("map") = "", py::arg("depth") = "", py::arg("mm_per_unit") = 1.0,
-             py::arg("depth_mm_per_unit") = 1.0,
+             py::arg("depth_scale") = 1.0,
              "Every metric of an estimate against the truth, as nested dictionaries. The estimate "
              "is a folder of ours or another program's trajectory (TUM), which may have a map (a "
-             "mesh) and depth (a folder); or depth alone. Lengths times mm_per_unit.");
+             "mesh) and depth (a folder); or depth alone. Lengths times mm_per_unit; depth files "
+             "times depth_scale before.");
 }
 
 }  // namespace rugae::python

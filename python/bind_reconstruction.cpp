@@ -41,7 +41,7 @@ std::unique_ptr<Live> begin(const std::string& folder, const std::string& calibr
 
 void add(Live& live, const py::array& rgb, double time_s) {
   // Conversion would make black pictures of floats from 0 to 1, and wrap 16 bits.
-  if (!rgb.dtype().is(py::dtype::of<std::uint8_t>()))
+  if (rgb.dtype().kind() != 'u' || rgb.dtype().itemsize() != 1)
     throw py::type_error("rgb is an array of " + std::string(py::str(rgb.dtype())) +
                          ", expected uint8");
   if (rgb.ndim() != 3 || rgb.shape(2) != 3)

@@ -8,11 +8,13 @@
 
 namespace rugae {
 
-std::string with_scene(const std::string& settings, const Scene& scene, int first_of) {
+std::string with_scene(const std::string& settings, const Scene& scene, int first_of,
+                       double read_noise_factor) {
   auto json = nlohmann::ordered_json::parse(settings, nullptr, false);
   check(json.is_object(), "the settings are not a JSON object: {}", settings);
   if (!scene.resolved_yaml.empty()) json["scene_yaml"] = scene.resolved_yaml;
   if (first_of > 0) json["first_of_frames"] = first_of;
+  if (read_noise_factor != 1.0) json["read_noise_factor"] = read_noise_factor;
   return json.dump();
 }
 

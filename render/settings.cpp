@@ -76,7 +76,7 @@ void RenderSettings::check() const {
       lens.motion_blur ? "motion_blur" : "defocus");
   rugae::check(!truth.coverage || truth.labels.triangles,
                "render.truth: coverage is counted from triangles, expected triangles to be true");
-  rugae::check(!truth.labels.indirect || light.bounces > 0,
+  rugae::check(!wanted_labels().indirect || light.bounces > 0,
                "render.truth: indirect is true, but render.light.bounces is 0");
 }
 

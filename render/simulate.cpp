@@ -7,6 +7,7 @@
 
 #include "core/check.h"
 #include "core/files.h"
+#include "core/presets.h"
 #include "core/units.h"
 #include "dataset/writer.h"
 #include "render/clearance.h"
@@ -19,6 +20,8 @@
 
 namespace rugae {
 namespace {
+
+constexpr double kLightClearance_mm = 1.0;  // assumed: of a light that stands out of the housing
 
 using Clock = std::chrono::steady_clock;
 
@@ -98,8 +101,12 @@ Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajecto
                       options.first);
   // a planned path keeps clear of wherever the wall may move; a given one is only checked
   TrajectoryOptions at_rest = trajectory;
-  const double clearance_mm =
-      std::max(trajectory.clearance_mm, 0.5 * camera.diameter_mm) + mount.reach_mm;
+  double clearance_mm =
+      std::max(trajectory.clearance_mm, 0.5 * std::max(camera.diameter_mm, mount.diameter_mm)) +
+      mount.reach_mm;
+  // A light in the wall would leave everything dark.
+  for (const Emitter& light : camera.lights)
+    clearance_mm = std::max(clearance_mm, light.offset_mm.norm() + kLightClearance_mm);
   at_rest.clearance_mm = clearance_mm;
   if (trajectory.file.empty()) at_rest.clearance_mm += scene.motion_reach_mm;
   const PlannedPath path = plan_path(scene.wall, at_rest, options.seed);
@@ -138,8 +145,15 @@ LensSampling lens_sampling(const LensSettings& lens, const Camera& camera, std::
   return sampling;
 }
 
+// What a trajectory's file says of the noise, which a file may say otherwise tomorrow; 1 of a
+// preset.
+double own_noise_factor(const SimulateOptions& options, const TrajectoryOptions& trajectory) {
+  const bool preset = std::ranges::count(preset_names("trajectories"), options.trajectory) > 0;
+  return preset ? 1.0 : trajectory.read_noise_factor;
+}
+
 DatasetInfo info_of(const SimulateOptions& options, const Path& path, const Camera& camera,
-                    const Scene& scene) {
+                    const Scene& scene, double noise_factor) {
   DatasetInfo info;
   info.scene = options.scene;
   info.camera = options.camera;
@@ -159,7 +173,7 @@ DatasetInfo info_of(const SimulateOptions& options, const Path& path, const Came
   info.truth = {options.render.wanted_labels(), row_time_s(options.render, camera, scene) > 0.0,
                 static_cast<bool>(scene.motion), labels && truth.tracks > 0,
                 labels && truth.coverage};
-  info.text = with_scene(settings_json(options.render), scene, path.first_of);
+  info.text = with_scene(settings_json(options.render), scene, path.first_of, noise_factor);
   return info;
 }
 
@@ -184,7 +198,7 @@ SimulateResult simulate(const SimulateOptions& options, const std::filesystem::p
           options.trajectory, options.camera);
     return simulate_rig(options, load_rig(options.camera), out, progress);
   }
-  return simulate_mounted(options, {load_camera(options.camera), {}, 0.0, options.seed}, out,
+  return simulate_mounted(options, {load_camera(options.camera), {}, 0.0, 0.0, options.seed}, out,
                           progress);
 }
 
@@ -199,6 +213,12 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
   check(!options.render.lens.defocus || camera.focus.f_number > 0.0,
         "camera '{}' has no focus (f_number and distance_mm), which lens.defocus needs",
         camera.name);
+  const auto check_pattern = [&](bool wanted, double spread, const char* key) {
+    check(!wanted || spread > 0.0, "camera '{}' has no {}, which sensor.{} needs", camera.name, key,
+          std::string_view(key).substr(0, 4));
+  };
+  check_pattern(options.render.sensor.prnu, camera.sensor.prnu, "prnu");
+  check_pattern(options.render.sensor.dsnu, camera.sensor.dsnu_e, "dsnu_e");
   const TrajectoryOptions trajectory = load_trajectory(options.trajectory);
   make_folder(out);  // a folder that cannot be is said before the long work, not after
   const Scene scene = load_scene({options.scene, options.seed, options.resolution, trajectory.oil});
@@ -213,7 +233,8 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
 
   const bool whole = options.only_frame < 0;
   std::map<int, FrameExposure> exposures = ExposureLog::read(out);
-  DatasetWriter writer(out, info_of(options, path, camera, scene));
+  DatasetWriter writer(
+      out, info_of(options, path, camera, scene, own_noise_factor(options, trajectory)));
   if (whole) writer.check_finished();
   writer.write_scene(camera, path.track, scene.wall);
   write_scene_truth(scene, writer.layout().truth());
@@ -234,7 +255,8 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
   result.min_clearance_mm = path.min_clearance_mm;
 
   progress.begin("frames", metered.size() + todo.size());
-  if (!todo.empty()) {
+  const bool tracks = options.render.labels && options.render.truth.tracks > 0;
+  if (!todo.empty() || (tracks && !std::filesystem::exists(writer.layout().track_points()))) {
     const LightSettings& light = options.render.light;
     const TruthSettings& truth = options.render.truth;
     const FrameRenderer renderer(
@@ -274,7 +296,7 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
                     .sampling = lens_sampling(options.render.lens, camera, mount.noise_seed),
                     .blurs = options.render.lens.motion_blur,
                     .first_written = first});
-    if (options.render.labels && truth.tracks > 0) {
+    if (tracks) {
       loop.track_points = choose_track_points(renderer, motion, frames, truth.tracks, options.seed);
       writer.write_track_points(loop.track_points);
     }

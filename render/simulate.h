@@ -51,6 +51,7 @@ struct Mount {
   Camera camera;
   Rigid3 capsule_from_camera;
   double reach_mm = 0.0;         // of the capsule around the path: a planned path keeps that clear
+  double diameter_mm = 0.0;      // of its widest camera: all of them fly the same path
   std::uint64_t noise_seed = 1;  // of what the camera draws alone
 };
 /// The dataset of one camera; `options.camera` is its name in the dataset.

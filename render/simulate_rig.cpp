@@ -40,10 +40,13 @@ SimulateResult simulate_rig(const SimulateOptions& options, const Rig& rig,
         "{}: differs from this run's; choose another folder or remove it", description.string());
   write_atomic(description, text);
 
+  double diameter_mm = 0.0;
+  for (const RigCamera& entry : rig.cameras)
+    diameter_mm = std::max(diameter_mm, entry.camera.diameter_mm);
   SimulateResult all;
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const RigCamera& entry = rig.cameras[i];
-    Mount mount{entry.camera, entry.capsule_from_camera, reach_mm(rig),
+    Mount mount{entry.camera, entry.capsule_from_camera, reach_mm(rig), diameter_mm,
                 noise_seed(options.seed, i)};
     // The capsule takes all its frames at once: as many as its first camera.
     mount.camera.frames_in_paper = rig.cameras.front().camera.frames_in_paper;

@@ -2,8 +2,9 @@
 # One frame of everything the simulator can do, on one sheet: contact_sheet.sh [OUT]; the sheets are OUT/contact_sheet.jpg
 # and OUT/labels.jpg (default out/contact_sheet/).
 set -euo pipefail
+out=${1:+$(realpath -m "$1")}  # where the caller stands
 cd "$(dirname "$0")/.."
-out=${1:-out/contact_sheet}
+out=${out:-out/contact_sheet}
 scripts/build.sh release rugae
 mkdir -p "$out/frames"
 pictures=()

@@ -24,7 +24,7 @@ struct ExternalMethod {
 /// Starts the program (no shell, the words above replaced), with its output in EST/command.log,
 /// and makes an estimate of what it leaves in {out}:
 ///   trajectory.txt   TUM, world_from_camera, of the frames it could place, each at its time in
-///                    frames.csv to within a hundredth of the time between frames
+///                    frames.csv to within a twentieth of the time between frames
 ///   map.ply          optional, same world
 /// Throws Error when it cannot be started, ends with an exit code other than 0, or leaves no
 /// trajectory or one whose times are not the frames'.

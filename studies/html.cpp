@@ -1,9 +1,11 @@
 #include "studies/html.h"
 
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string_view>
 
 #include "core/check.h"
 
@@ -48,6 +50,16 @@ std::string escape(const std::string& text) {
     }
   }
   return out;
+}
+
+std::string link_to(const std::string& id) {
+  std::string address = "#";
+  for (const unsigned char c : id)
+    address += std::isalnum(c) ||
+                       std::string_view("-._~").find(static_cast<char>(c)) != std::string_view::npos
+                   ? std::string(1, static_cast<char>(c))
+                   : fmt::format("%{:02X}", c);
+  return address;
 }
 
 std::string jpeg(const cv::Mat& image, int max_width_px, int quality) {

@@ -10,6 +10,9 @@ namespace rugae::html {
 /// Text with & < > and quotes written so that it shows as it is.
 std::string escape(const std::string& text);
 
+/// "#name" as an address within the page: RFC 3986, section 2.1.
+std::string link_to(const std::string& id);
+
 /// "data:image/jpeg;base64,...": 8-bit BGR or gray, made smaller where wider than `max_width_px`.
 std::string jpeg(const cv::Mat& image, int max_width_px = 640, int quality = 86);
 /// The same without loss; for pictures of few colours.

@@ -112,7 +112,7 @@ std::string overview_part(const std::vector<CellResult>& cells) {
       const auto v = published(table, cell.cell.trajectory, cell.cell.camera);
       return "<small>" + (v ? html::number(*v) : std::string("&ndash;")) + "</small>";
     };
-    table.rows.push_back({fmt::format("<a href=\"#{}\">{}</a>", html::escape(cell.cell.name()),
+    table.rows.push_back({fmt::format("<a href=\"{}\">{}</a>", html::link_to(cell.cell.name()),
                                       html::escape(published_camera(stem(cell.cell.camera)))),
                           html::escape(stem(cell.cell.trajectory)),
                           html::escape(cell.cell.method) + "<br><small>" +
@@ -127,11 +127,11 @@ std::string overview_part(const std::vector<CellResult>& cells) {
     const DatasetLayout layout{cell.dataset};
     const int frame = frame_of_sheet(cell.dataset);
     sheet += fmt::format(
-        "<a href=\"#{0}\"><img loading=\"lazy\" src=\"{1}\" alt=\"{0}, frame {2}\"><span>{3}, "
+        "<a href=\"{5}\"><img loading=\"lazy\" src=\"{1}\" alt=\"{0}, frame {2}\"><span>{3}, "
         "{4}</span></a>",
         html::escape(cell.cell.name()), html::jpeg(read_image_bgr(layout.frame(frame)), 300), frame,
         html::escape(published_camera(stem(cell.cell.camera))),
-        html::escape(stem(cell.cell.trajectory)));
+        html::escape(stem(cell.cell.trajectory)), html::link_to(cell.cell.name()));
   }
   return "<section class=\"chapter\"><h2>All cells</h2>" + sheet + "</div>" + table.str() +
          "</section>\n";

@@ -16,9 +16,10 @@ std::string title_of(const std::string& title, const std::string& unit) {
   return unit.empty() ? title : fmt::format("{} ({})", title, unit);
 }
 
-// What people call a camera; others by their names.
+// What people call a camera; trajectories by their files' names; values as they are.
 std::string called(const std::string& what, const std::string& value) {
-  return what == "camera" ? published_camera(stem(value)) : stem(value);
+  if (what == "camera") return published_camera(stem(value));
+  return what == "trajectory" ? stem(value) : value;
 }
 
 std::string with_interval(const Repeats& r) {

@@ -76,9 +76,10 @@ std::vector<Quat> interpolating_controls(const std::vector<Quat>& rotations) {
   set_ends();
   // Each round moves every control by what the spline misses at its knot; the spline's weight there
   // is 2/3, so the error shrinks by about a third or better.
+  double worst = 0.0;
   for (int round = 0; round < kMaxRounds; ++round) {
     std::vector<Quat> miss(n);
-    double worst = 0.0;
+    worst = 0.0;
     for (int k = 0; k < n; ++k) {
       const Quat now = spline_rotation(control, k);
       miss[k] = now.conjugate() * rotations[k];
@@ -88,6 +89,11 @@ std::vector<Quat> interpolating_controls(const std::vector<Quat>& rotations) {
     for (int k = 0; k < n; ++k) control[k + 1] = (control[k + 1] * miss[k]).normalized();
     set_ends();
   }
+  constexpr double kFollowedRad = 1e-6;
+  check(worst <= kFollowedRad,
+        "rotations turn too far between neighbours for a smooth path through them ({:.3g} rad are "
+        "missed); give poses in between",
+        worst);
   return control;
 }
 

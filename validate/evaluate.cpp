@@ -61,6 +61,11 @@ json tracking_json(const PoseErrors& poses, const Estimate& estimate) {
 }
 
 json time_json(const Estimate& estimate) {
+  if (estimate.stages.empty())  // of another program: nobody knows
+    return {{"reconstruct_s", nullptr},     {"pair_s", nullptr},
+            {"frames_per_s", nullptr},      {"path_s", nullptr},
+            {"path_frames_per_s", nullptr}, {"peak_rss_mb", nullptr},
+            {"stage_s", json::object()},    {"stages", json::array()}};
   json stages = json::array(), stage_s = json::object();
   double seconds = 0.0, peak_mb = 0.0;
   for (const StageTime& stage : estimate.stages) {
@@ -278,13 +283,16 @@ void ForeignFiles::check() const {
                "{}: a map is placed by the trajectory, which is missing", map.string());
   rugae::check(mm_per_unit > 0.0 && std::isfinite(mm_per_unit),
                "mm-per-unit is {}, expected above 0", mm_per_unit);
-  rugae::check(depth_mm_per_unit > 0.0 && std::isfinite(depth_mm_per_unit),
-               "depth-scale is {}, expected above 0", depth_mm_per_unit);
+  rugae::check(depth_scale > 0.0 && std::isfinite(depth_scale),
+               "depth-scale is {}, expected above 0", depth_scale);
 }
 
 json evaluate(const fs::path& dataset, const ForeignFiles& files, Progress& progress) {
   files.check();
   const Truth truth = Truth::open(dataset);
+  check(files.depth.empty() || truth.has_label("depth"),
+        "{}: made without depth, there is nothing to measure {} against", dataset.string(),
+        files.depth.string());
   std::vector<double> times_s;
   for (const TimedPose& pose : truth.track()) times_s.push_back(pose.time_s);
   Measured measured;
@@ -303,8 +311,9 @@ json evaluate(const fs::path& dataset, const ForeignFiles& files, Progress& prog
   measured.depth_is_mm = !depth.empty();
   measured.depth = [&](int frame) {
     const auto file = depth.find(frame);
-    return file == depth.end() ? cv::Mat()
-                               : read_foreign_depth_mm(file->second, files.depth_mm_per_unit);
+    return file == depth.end()
+               ? cv::Mat()
+               : read_foreign_depth_mm(file->second, files.depth_scale * files.mm_per_unit);
   };
   return metrics_of(truth, measured, progress);
 }

@@ -24,8 +24,8 @@ struct ForeignFiles {
   std::filesystem::path trajectory = {};  // TUM, world_from_camera, at the frames' times
   std::filesystem::path map = {};         // any mesh file, in the trajectory's world
   std::filesystem::path depth = {};  // folder: EXR or 16-bit PNG named by their frames, along z
-  double mm_per_unit = 1.0;          // of trajectory and map
-  double depth_mm_per_unit = 1.0;    // of the depth files
+  double mm_per_unit = 1.0;          // of all three
+  double depth_scale = 1.0;          // units of the trajectory a step of the depth files
   /// Throws Error naming what is missing, or the field and its value.
   void check() const;
 };

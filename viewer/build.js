@@ -2,10 +2,11 @@
 
 import {build} from "esbuild";
 import {mkdir, rename, writeFile} from "node:fs/promises";
+import {fileURLToPath} from "node:url";
 
 const here = new URL(".", import.meta.url);
 const bundled = await build({
-  absWorkingDir: here.pathname,
+  absWorkingDir: fileURLToPath(here),
   entryPoints: ["src/main.js"],
   bundle: true,
   minify: true,

@@ -51,8 +51,7 @@ cv::Mat flow_code(const cv::Mat& flow_px, const cv::Mat& masks) {
   for (int y = 0; y < code.rows; ++y)
     for (int x = 0; x < code.cols; ++x) {
       const cv::Vec2f& flow = flow_px.at<cv::Vec2f>(y, x);
-      const bool hidden =
-          !masks.empty() && (masks.at<uchar>(y, x) & kMaskBackwardFlowOccluded) != 0;
+      const bool hidden = (masks.at<uchar>(y, x) & kMaskBackwardFlowOccluded) != 0;
       const double most = std::max(std::abs(flow[0]), std::abs(flow[1]));
       if (hidden || !(most <= kMostFlow_px)) continue;
       for (int axis = 0; axis < 2; ++axis)
@@ -76,10 +75,13 @@ std::string pose_line(const Rigid3& world_from_camera) {
 
 std::vector<std::string> export_c3vd(const ExportSource& source, Progress& progress) {
   const LabelSet& has = source.info.truth.labels;
-  const auto file = [&](int frame, const char* what) {
-    return source.out / fmt::format("{:04}_{}", frame, what);
-  };
   const auto frames = static_cast<std::size_t>(source.frames());
+  // As wide as the last one: readers sort names.
+  const std::size_t width = std::max<std::size_t>(4, std::to_string(frames - 1).size());
+  const auto file = [&](int frame, const char* what) {
+    return source.out / fmt::format("{:0{}}_{}", frame, width, what);
+  };
+  const bool has_flow = has.backward_flow && has.masks;  // these know what is hidden
   progress.begin("frames", frames);
   do_in_lots(frames, kExportLot, progress, [&](std::size_t i) {
     const int frame = static_cast<int>(i);
@@ -97,10 +99,9 @@ std::vector<std::string> export_c3vd(const ExportSource& source, Progress& progr
       write_once(file(frame, "normals.tiff"), [&](const fs::path& to) {
         write_image(to, normal_code(source.truth.normal(frame)));
       });
-    if (has.backward_flow && frame > 0)
+    if (has_flow && frame > 0)
       write_once(file(frame, "flow.tiff"), [&](const fs::path& to) {
-        write_image(to, flow_code(source.truth.backward_flow_px(frame),
-                                  has.masks ? source.truth.masks(frame) : cv::Mat()));
+        write_image(to, flow_code(source.truth.backward_flow_px(frame), source.truth.masks(frame)));
       });
   });
   std::string poses;
@@ -113,12 +114,12 @@ std::vector<std::string> export_c3vd(const ExportSource& source, Progress& progr
       "the lens is in calibration.yaml, not Scaramuzza's polynomial; no occlusion images"};
   if (!has.depth) notes.push_back("the dataset has no depth: no depth images");
   if (!has.normals) notes.push_back("the dataset has no normals: no images of them");
-  if (has.backward_flow)
+  if (has_flow)
     notes.push_back("flow of more than 20 px is left out: the format cannot say it");
   else
     notes.push_back(
         "no flow: it leads to the frame before, which a dataset made with --set "
-        "truth.backward_flow=true has");
+        "truth.backward_flow=true (and masks, which know what is hidden) has");
   return notes;
 }
 

@@ -8,6 +8,7 @@
 #include "core/check.h"
 #include "dataset/export/formats.h"
 #include "dataset/export/points.h"
+#include "dataset/image_io.h"
 
 namespace rugae {
 namespace {
@@ -57,7 +58,15 @@ class LongText {
 std::vector<std::string> export_colmap(const ExportSource& source, Progress& progress) {
   const fs::path sparse = source.out / "sparse" / "0";
   make_folder(sparse);
-  const auto names = write_frames(source, "images", 0.0, progress);
+  std::vector<std::string> notes;
+  const auto names = write_frames(source, "images", std::nullopt, progress, notes);
+  if (source.lens().stop.shape != StopShape::full) {  // for --ImageReader.mask_path
+    make_folder(source.out / "masks");
+    for (const std::string& name : names)
+      write_once(source.out / "masks" / (name + ".png"),
+                 [&](const fs::path& file) { write_image(file, stop_mask(source.lens())); });
+    notes.push_back("masks/ has the field stop, for --ImageReader.mask_path");
+  }
   const WallPoints wall(source, progress);
   progress.begin("sparse model", names.size());
   std::vector<std::string> tracks(wall.points().size());  // "image, its how manieth point" each
@@ -82,7 +91,7 @@ std::vector<std::string> export_colmap(const ExportSource& source, Progress& pro
   LongText points(sparse / "points3D.txt");
   points.add("# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n");
   for (std::size_t i = 0; i < wall.points().size(); ++i) {
-    const WallPoint& point = wall.points()[i];
+    const ColouredPoint& point = wall.points()[i];
     points.add(fmt::format("{} {} {} {} {} 0{}\n", i + 1,
                            joined({point.place_mm.x(), point.place_mm.y(), point.place_mm.z()}),
                            point.color[0], point.color[1], point.color[2], tracks[i]));
@@ -92,13 +101,7 @@ std::vector<std::string> export_colmap(const ExportSource& source, Progress& pro
   write_atomic(sparse / "cameras.txt",
                "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n" + camera_line(source.lens()));
 
-  std::vector<std::string> notes;
-  if (wall.points().empty())
-    notes.push_back("the dataset has neither followed points nor depth: no points");
-  else if (!wall.followed())
-    notes.push_back(
-        "points are from depth, without tracks; a dataset made with --set truth.tracks=2000 has "
-        "them");
+  if (!wall.note().empty()) notes.push_back(wall.note());
   if (has_distortion(source.lens()))
     notes.push_back("images are distorted: colmap image_undistorter makes pinhole ones");
   return notes;

@@ -64,8 +64,8 @@ void take_folder(const fs::path& out, const std::string& marker) {
   const fs::path file = out / "export.json";
   if (fs::exists(file)) {
     check(read_text(file) == marker,
-          "{}: holds an export of another dataset, or in another format; choose another folder or "
-          "remove it",
+          "{}: holds another export (dataset, format or depth-per-mm differ); choose another "
+          "folder or remove it",
           out.string());
     return;
   }
@@ -79,7 +79,7 @@ void take_folder(const fs::path& out, const std::string& marker) {
 
 void ExportOptions::check() const {
   const Format& chosen = format_named(format);
-  rugae::check(depth_per_mm >= 0.0 && depth_per_mm <= 65535.0,
+  rugae::check(depth_per_mm == 0.0 || (depth_per_mm >= 1.0 && depth_per_mm <= 65535.0),
                "depth-per-mm is {}, expected steps of depth a millimetre, 1 to 65535",
                depth_per_mm);
   rugae::check(depth_per_mm == 0.0 || chosen.fine_depth,
@@ -106,6 +106,12 @@ ExportReport export_dataset(const fs::path& dataset, const ExportOptions& option
 
   ExportReport report{source.frames(), format_named(options.format).write(source, progress)};
   progress.end();
+  if (source.lens().stop.shape != StopShape::full && options.format != "nerfstudio" &&
+      options.format != "colmap")
+    report.notes.push_back("pixels outside of the field stop are dark, which nothing here says");
+  if (options.format != "nerfstudio" && sees_behind(source.lens()))
+    report.notes.push_back(
+        "the lens sees beyond 90 degrees, where depth along z and most programs' models end");
   if (source.info.truth.row_poses)
     report.notes.push_back(
         "the shutter is a rolling one: a pose is that of the middle row, depth each row's own");

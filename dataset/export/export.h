@@ -30,8 +30,8 @@ std::vector<ExportFormat> export_formats();
 
 /// Writes a finished dataset into `out`, which must be empty or hold an earlier export of the same
 /// dataset with the same options: that one goes on where it stopped, the lists that name the frames
-/// being written last. Throws Error for a folder that holds something else, an unfinished dataset,
-/// and a lens that the format has no model for.
+/// being written last. Throws Error for a folder that holds something else or lies in the dataset,
+/// and for an unfinished dataset.
 ExportReport export_dataset(const std::filesystem::path& dataset, const ExportOptions& options,
                             const std::filesystem::path& out, Progress& progress);
 

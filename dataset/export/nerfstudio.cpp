@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
-#include <opencv2/core.hpp>
 
 #include "core/mesh_io.h"
 #include "dataset/export/formats.h"
@@ -46,18 +45,10 @@ Json camera_of(const Lens& lens) {
   return camera;
 }
 
-cv::Mat stop_mask(const Lens& lens) {
-  cv::Mat mask(lens.height, lens.width, CV_8U, cv::Scalar(0));
-  for (int y = 0; y < mask.rows; ++y)
-    for (int x = 0; x < mask.cols; ++x)
-      if (lens.passes_stop({x + 0.5, y + 0.5})) mask.at<uchar>(y, x) = 255;
-  return mask;
-}
-
 // Where splats begin.
 TriangleMesh points_in_metres(const WallPoints& wall) {
   TriangleMesh points;
-  for (const WallPoint& point : wall.points()) {
+  for (const ColouredPoint& point : wall.points()) {
     points.vertices.push_back(kMetresPerMm * point.place_mm);
     points.colors.push_back(Vec3f(point.color[0], point.color[1], point.color[2]) / 255.0f);
   }
@@ -69,15 +60,19 @@ TriangleMesh points_in_metres(const WallPoints& wall) {
 std::vector<std::string> export_nerfstudio(const ExportSource& source, Progress& progress) {
   const bool depth = source.info.truth.labels.depth;
   const bool stopped = source.lens().stop.shape != StopShape::full;
-  const double per_mm = source.depth_per_mm > 0.0 ? source.depth_per_mm : kDepthPerMm;
-  const auto names = write_frames(source, "images", depth ? per_mm : 0.0, progress);
+  // Its rays of a fisheye are unit vectors, those of a pinhole have z = 1: depth goes with them.
+  const DepthCode code{source.depth_per_mm > 0.0 ? source.depth_per_mm : kDepthPerMm,
+                       source.lens().model == LensModel::kannala_brandt};
+  std::vector<std::string> notes;
+  const auto names =
+      write_frames(source, "images", depth ? std::optional(code) : std::nullopt, progress, notes);
   if (stopped) write_image(source.out / "mask.png", stop_mask(source.lens()));
 
   const WallPoints wall(source, progress);
   progress.begin("transforms.json");
   Json transforms = camera_of(source.lens());
   if (!wall.points().empty()) {
-    write_ply(source.out / "points.ply", points_in_metres(wall));
+    write_ply(source.out / "points.ply", points_in_metres(wall), false, "m");
     transforms["ply_file_path"] = "points.ply";
   }
   for (int frame = 0; frame < source.frames(); ++frame) {
@@ -88,9 +83,10 @@ std::vector<std::string> export_nerfstudio(const ExportSource& source, Progress&
     transforms["frames"].push_back(std::move(entry));
   }
   write_atomic(source.out / "transforms.json", transforms.dump(1) + "\n");
-  if (!depth) return {"the dataset has no depth: no depth/"};
-  return {fmt::format("depth in steps of {:.4g} mm: --depth-unit-scale-factor {:.9g}", 1.0 / per_mm,
-                      kMetresPerMm / per_mm)};
+  if (depth)
+    notes.push_back(fmt::format("{}: --depth-unit-scale-factor {:.9g}", code.text(),
+                                kMetresPerMm / code.per_mm));
+  return notes;
 }
 
 }  // namespace rugae

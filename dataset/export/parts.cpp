@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <opencv2/core.hpp>
 
 #include "core/in_lots.h"
 #include "dataset/image_io.h"
@@ -18,33 +20,85 @@ std::string copy_frame(const ExportSource& source, int frame, const std::filesys
   return to.filename().string();
 }
 
-cv::Mat coded_depth(const cv::Mat& depth_mm, double per_mm) {
+std::string DepthCode::text() const {
+  return fmt::format("{} in steps of {:.4g} mm, up to {:.4g} mm",
+                     along_ray ? "distance along the ray" : "depth", 1.0 / per_mm, most_mm());
+}
+
+namespace {
+
+// Beyond 90 degrees off the axis both z are negative.
+cv::Mat along_rays(const cv::Mat& depth_mm, const Lens& lens) {
+  const LensProjector projector(lens);
+  cv::Mat range_mm(depth_mm.size(), CV_32F);
+  for (int y = 0; y < depth_mm.rows; ++y)
+    for (int x = 0; x < depth_mm.cols; ++x) {
+      const auto ray = projector.unproject({x + 0.5, y + 0.5});
+      range_mm.at<float>(y, x) =
+          ray ? static_cast<float>(depth_mm.at<float>(y, x) / ray->z()) : 0.0f;
+    }
+  return range_mm;
+}
+
+// How many pixels are too far is added to `too_far`.
+cv::Mat coded(const cv::Mat& depth_mm, double per_mm, std::atomic<std::size_t>& too_far) {
   constexpr double kTop = 65535.0;
-  cv::Mat code(depth_mm.size(), CV_16U);
+  cv::Mat code(depth_mm.size(), CV_16U, cv::Scalar(0));
   for (int y = 0; y < code.rows; ++y)
     for (int x = 0; x < code.cols; ++x) {
       const double steps = std::round(per_mm * depth_mm.at<float>(y, x));
-      code.at<ushort>(y, x) = steps > 0.0 && steps <= kTop ? static_cast<ushort>(steps) : 0;
+      if (steps > kTop)
+        ++too_far;
+      else if (steps > 0.0)
+        code.at<ushort>(y, x) = static_cast<ushort>(steps);
     }
   return code;
 }
 
+}  // namespace
+
 std::vector<std::string> write_frames(const ExportSource& source, const std::string& images,
-                                      double depth_per_mm, Progress& progress) {
+                                      const std::optional<DepthCode>& depth, Progress& progress,
+                                      std::vector<std::string>& notes) {
   make_folder(source.out / images);
-  if (depth_per_mm > 0.0) make_folder(source.out / "depth");
+  if (depth) make_folder(source.out / "depth");
   std::vector<std::string> names(source.frames());
+  std::atomic<std::size_t> too_far = 0;
   progress.begin("frames", names.size());
   do_in_lots(names.size(), kExportLot, progress, [&](std::size_t i) {
     const int frame = static_cast<int>(i);
     const std::string stem = fmt::format("{:06}", frame);
     names[i] = copy_frame(source, frame, source.out / images / stem);
-    if (!(depth_per_mm > 0.0)) return;
+    if (!depth) return;
     write_once(source.out / "depth" / (stem + ".png"), [&](const auto& file) {
-      write_image(file, coded_depth(source.truth.depth_mm(frame), depth_per_mm));
+      const cv::Mat z_mm = source.truth.depth_mm(frame);
+      write_image(file, coded(depth->along_ray ? along_rays(z_mm, source.lens()) : z_mm,
+                              depth->per_mm, too_far));
     });
   });
+  if (too_far > 0)
+    notes.push_back(fmt::format("{} pixels are farther than {:.4g} mm: 0 there", too_far.load(),
+                                depth->most_mm()));
   return names;
+}
+
+cv::Mat stop_mask(const Lens& lens) {
+  cv::Mat mask(lens.height, lens.width, CV_8U, cv::Scalar(0));
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x < mask.cols; ++x)
+      if (lens.passes_stop({x + 0.5, y + 0.5})) mask.at<uchar>(y, x) = 255;
+  return mask;
+}
+
+bool sees_behind(const Lens& lens) {
+  const LensProjector projector(lens);
+  for (int y = 0; y < lens.height; ++y)
+    for (int x = 0; x < lens.width; ++x) {
+      const Vec2 pixel(x + 0.5, y + 0.5);
+      const auto ray = projector.unproject(pixel);
+      if (ray && !(ray->z() > 0.0) && lens.passes_stop(pixel)) return true;
+    }
+  return false;
 }
 
 std::vector<double> opencv_distortion(const Lens& lens) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,13 +42,25 @@ void write_once(const std::filesystem::path& file, Write write) {
 /// The frame as it is, under another name that gets its extension. Returns the file's name.
 std::string copy_frame(const ExportSource& source, int frame, const std::filesystem::path& stem);
 
-/// CV_16U: depth times `per_mm`, rounded; 0 where it is not known, not above 0, or beyond 65535.
-cv::Mat coded_depth(const cv::Mat& depth_mm, double per_mm);
+/// How depth images say what they say.
+struct DepthCode {
+  double per_mm = 0.0;     // steps
+  bool along_ray = false;  // distance, not z
+  double most_mm() const { return 65535.0 / per_mm; }
+  std::string text() const;  // for notes
+};
 
-/// All frames into the folder `images` of the export, and their depth into depth/ where
-/// `depth_per_mm` is above 0. Returns the frames' file names.
+/// All frames into the folder `images` of the export, and their depth into depth/ where there is a
+/// code for it: CV_16U, rounded; 0 where it is not known, not above 0, or too far. Returns the
+/// frames' file names; a note says so where depth was too far.
 std::vector<std::string> write_frames(const ExportSource& source, const std::string& images,
-                                      double depth_per_mm, Progress& progress);
+                                      const std::optional<DepthCode>& depth, Progress& progress,
+                                      std::vector<std::string>& notes);
+
+/// 255 where the field stop lets light through.
+cv::Mat stop_mask(const Lens& lens);
+/// Some pixel's ray leads to z = 0 or behind.
+bool sees_behind(const Lens& lens);
 
 /// Coefficients in OpenCV's order, which other programs took over: k1 k2 p1 p2 k3, or k1 k2 k3 k4
 /// of a fisheye.

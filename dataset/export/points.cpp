@@ -15,6 +15,9 @@ constexpr int kFewestFrames = 2;  // of a track: COLMAP's adjustment takes none 
 constexpr int kLiftedFrames = 16;
 constexpr double kLiftedInFrame = 1200.0;  // points: enough to begin a scene of splats with
 
+// Models of other programs see nothing beyond 90 degrees off the axis.
+bool is_seen(const TrackSample& sample) { return sample.visible && sample.depth_mm > 0.0; }
+
 cv::Vec3b rgb_at(const cv::Mat& bgr, const Vec2& pixel) {
   const cv::Vec3b color =
       bgr.at<cv::Vec3b>(static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
@@ -24,10 +27,18 @@ cv::Vec3b rgb_at(const cv::Mat& bgr, const Vec2& pixel) {
 }  // namespace
 
 WallPoints::WallPoints(const ExportSource& source, Progress& progress) : source_(source) {
-  if (source.info.truth.tracks && !source.truth.wall_moves())
-    follow(progress);
-  else if (source.info.truth.labels.depth)
+  const bool tracks = source.info.truth.tracks, moves = source.truth.wall_moves();
+  if (tracks && !moves) follow(progress);
+  if (followed()) return;
+  const std::string why = !tracks ? "the dataset follows none (--set truth.tracks=2000 does)"
+                          : moves ? "the wall moves"
+                                  : "no two frames see one of them";
+  if (source.info.truth.labels.depth) {
     lift(progress);
+    note_ = "points are from depth, without tracks: " + why;
+  } else {
+    note_ = "no points: the dataset has no depth, and no tracks: " + why;
+  }
 }
 
 void WallPoints::follow(Progress& progress) {
@@ -39,7 +50,7 @@ void WallPoints::follow(Progress& progress) {
   std::map<int, Sight> sights;  // by point
   for (int frame = 0; frame < source_.frames(); ++frame) {
     for (const TrackSample& sample : source_.truth.tracks(frame)) {
-      if (!sample.visible) continue;
+      if (!is_seen(sample)) continue;
       Sight& sight = sights[sample.point];
       if (sight.frames++ == 0) sight.first = frame, sight.pixel = sample.pixel;
     }
@@ -97,7 +108,7 @@ std::vector<WallPoints::Seen> WallPoints::seen_in(int frame) const {
   if (!followed()) return seen;
   for (const TrackSample& sample : source_.truth.tracks(frame))
     if (const auto found = number_of_.find(sample.point);
-        sample.visible && found != number_of_.end())
+        is_seen(sample) && found != number_of_.end())
       seen.push_back({found->second, sample.pixel});
   return seen;
 }

@@ -9,7 +9,7 @@
 
 namespace rugae {
 
-struct WallPoint {
+struct ColouredPoint {
   Vec3 place_mm;    // world
   cv::Vec3b color;  // RGB, of the first frame that sees it
 };
@@ -21,8 +21,10 @@ class WallPoints {
   /// wall, of which nobody knows in which other frames they are; none without depth.
   WallPoints(const ExportSource& source, Progress& progress);
 
-  const std::vector<WallPoint>& points() const { return points_; }
+  const std::vector<ColouredPoint>& points() const { return points_; }
   bool followed() const { return !number_of_.empty(); }
+  /// Why there are none, or no tracks; else empty.
+  const std::string& note() const { return note_; }
 
   struct Seen {
     std::size_t point = 0;
@@ -36,7 +38,8 @@ class WallPoints {
   void lift(Progress& progress);
 
   const ExportSource& source_;
-  std::vector<WallPoint> points_;
+  std::vector<ColouredPoint> points_;
+  std::string note_;
   std::map<int, std::size_t> number_of_;  // of a followed point, among these
 };
 

@@ -29,8 +29,10 @@ std::string calibration_of(const Lens& lens) {
 
 std::vector<std::string> export_tum(const ExportSource& source, Progress& progress) {
   const bool depth = source.info.truth.labels.depth;
-  const double per_mm = source.depth_per_mm > 0.0 ? source.depth_per_mm : kDepthPerMm;
-  const auto images = write_frames(source, "rgb", depth ? per_mm : 0.0, progress);
+  const DepthCode code{source.depth_per_mm > 0.0 ? source.depth_per_mm : kDepthPerMm};
+  std::vector<std::string> notes;
+  const auto images =
+      write_frames(source, "rgb", depth ? std::optional(code) : std::nullopt, progress, notes);
 
   const std::string name = fmt::format("{}, {}, trajectory {}", source.info.scene,
                                        source.info.camera, source.info.trajectory);
@@ -56,12 +58,19 @@ std::vector<std::string> export_tum(const ExportSource& source, Progress& progre
     write_atomic(source.out / "depth.txt", depths);
     write_atomic(source.out / "associations.txt", pairs);
   }
-  write_atomic(source.out / "calibration.txt", calibration_of(source.lens()));
+  // Readers of the list of numbers take its four coefficients for k1 k2 p1 p2.
+  const bool fisheye = source.lens().model == LensModel::kannala_brandt;
+  write_atomic(source.out / (fisheye ? "calibration_fisheye.txt" : "calibration.txt"),
+               calibration_of(source.lens()));
   write_atomic(source.out / "groundtruth.txt", poses);
   write_atomic(source.out / "rgb.txt", rgb);
-  if (!depth) return {"the dataset has no depth: no depth/"};
-  return {fmt::format("depth in steps of {:.4g} mm: a reader's depth factor is {:.17g}",
-                      1.0 / per_mm, per_mm / kMetresPerMm)};
+  if (depth)
+    notes.push_back(
+        fmt::format("{}: a reader's depth factor is {}", code.text(), code.per_mm / kMetresPerMm));
+  if (has_distortion(source.lens()))
+    notes.push_back(fmt::format("images are distorted{}: their reader must know",
+                                fisheye ? " as a fisheye does" : ""));
+  return notes;
 }
 
 }  // namespace rugae

@@ -146,15 +146,24 @@ TEST_F(CommandLine, ExportsSayWhatTheirReaderShouldKnow) {
   ASSERT_EQ(made.code, kDone) << made.error;
   const auto said = nlohmann::json::parse(made.out);
   EXPECT_EQ(said["frames"], 4);
-  EXPECT_EQ(said["notes"][0], "depth in steps of 0.005 mm: --depth-unit-scale-factor 5e-06");
+  EXPECT_EQ(said["notes"][0],
+            "depth in steps of 0.005 mm, up to 327.7 mm: --depth-unit-scale-factor 5e-06");
   EXPECT_TRUE(fs::exists(folder_ / "theirs" / "transforms.json"));
   expect_refused("export data --format nerfstudoi --out other",
                  "format 'nerfstudoi': no such format; did you mean 'nerfstudio'?; known: tum, "
                  "colmap, nerfstudio, c3vd");
   expect_refused("export data --format tum --out theirs",
-                 "theirs: holds an export of another dataset, or in another format; choose "
+                 "theirs: holds another export (dataset, format or depth-per-mm differ); choose "
                  "another folder or remove it");
   EXPECT_NE(rugae("list formats").out.find("c3vd"), std::string::npos);
+}
+
+TEST_F(CommandLine, AllLabelsMeansAll) {
+  write("tiny.yaml", kTinyCamera);
+  write("none.yaml", "labels: false\n");
+  const Outcome made = rugae(std::string(kSmallDataset) + " --options none.yaml --all-labels");
+  EXPECT_EQ(made.code, kDone) << made.error;
+  EXPECT_TRUE(fs::exists(folder_ / "data" / "truth" / "albedo" / "000000.exr"));
 }
 
 TEST_F(CommandLine, DamagedDatasetsAreNamed) {

@@ -273,12 +273,13 @@ TEST(ImageIo, WrongTypesAreRefused) {
   const TemporaryFolder folder("types");
   EXPECT_EQ(error_of([&] { write_image(folder.path() / "a.png", field(3)); }),
             (folder.path() / "a.png").string() +
-                ": image of type CV_32FC3, expected 8-bit (PNG also 16-bit) with 1 or 3 channels");
+                ": image of type CV_32FC3, expected 8-bit (PNG and TIFF also 16-bit) with 1 or 3 "
+                "channels");
   EXPECT_EQ(error_of([&] { write_exr(folder.path() / "a.exr", noise(CV_8UC1, 1)); }),
             (folder.path() / "a.exr").string() +
                 ": image of type CV_8UC1, expected float32 of 1 to 3 channels");
   EXPECT_EQ(error_of([&] { write_image(folder.path() / "a.gif", noise(CV_8UC1, 1)); }),
-            (folder.path() / "a.gif").string() + ": images are written as .png or .jpg");
+            (folder.path() / "a.gif").string() + ": images are written as .png, .jpg or .tiff");
 }
 
 }  // namespace

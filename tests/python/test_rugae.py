@@ -1,5 +1,6 @@
 """The module against a plane known in closed form: test_rugae.py PLANE_DATASET_PROGRAM."""
 import os
+import pickle
 import subprocess
 import sys
 import tempfile
@@ -150,7 +151,7 @@ class RugaeTest(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             rugae.export(self.dataset_path, "tum", folder + "/tum", depth_per_mm=100)
             m = rugae.evaluate(self.dataset_path, folder + "/tum/groundtruth.txt", mm_per_unit=1000,
-                               depth=folder + "/tum/depth", depth_mm_per_unit=0.01)
+                               depth=folder + "/tum/depth", depth_scale=1e-5)
             self.assertLess(m["trajectory"]["ate_se3_rmse_mm"], 1e-6)
             self.assertLess(m["depth"]["as_given"]["rmse_mm"], 0.005)
             self.assertEqual(m["depth"]["as_given"]["frames"], len(self.dataset))
@@ -172,6 +173,10 @@ class RugaeTest(unittest.TestCase):
         self.assertEqual(e.map_triangles.shape, (2, 3))
         self.assertEqual(e.points.shape, (4, 3))
         self.assertIsNone(e.depth(0))
+        np.testing.assert_array_equal(e.depth(-5), e.depth(1))
+        for outside in (6, -7):
+            with self.assertRaises(IndexError):
+                e.depth(outside)
         np.testing.assert_allclose(e.depth(1), 0.5 * self.dataset.depth_mm(1), rtol=1e-6)
 
     def test_umeyama(self):
@@ -193,7 +198,7 @@ class RugaeTest(unittest.TestCase):
         estimated, true = [], []
         for i in range(16):
             centre = np.array([1.2 * i, 0.3 * i, 0.2 * i])
-            live.add(camera.picture(centre), i / 30.0)
+            live.add(pickle.loads(pickle.dumps(camera.picture(centre))), i / 30.0)  # as from another process
             pose = live.pose()
             if pose is not None:
                 estimated.append(pose[:3, 3])

@@ -235,6 +235,42 @@ TEST_F(Export, NerfstudioDepthAndPosesPutPixelsOnTheWall) {
     EXPECT_LE(wall(kMm * point).distance_mm, 0.01);  // metres in single precision
 }
 
+// Its reader takes unit rays for a fisheye: depth is the distance along them.
+TEST_F(Export, NerfstudioHasDistancesOfAFisheye) {
+  const fs::path out = exported(fisheye(), {"nerfstudio"});
+  EXPECT_TRUE(noted("distance along the ray"));
+  const Truth truth = Truth::open(fisheye());
+  const Lens& lens = truth.camera().lens;
+  const ClosestPoint wall(truth.wall());
+  const cv::Mat depth = cv::imread((out / "depth" / "000003.png").string(), cv::IMREAD_UNCHANGED);
+  const RowPoses poses = truth.row_poses(3);
+  int off_axis = 0;
+  for (int y = 4; y < lens.height; y += 8)
+    for (int x = 4; x < lens.width; x += 8) {
+      if (depth.at<ushort>(y, x) == 0) continue;
+      const Vec3 ray = lens.unproject({x + 0.5, y + 0.5}).value();
+      off_axis += ray.z() < 0.6 ? 1 : 0;
+      EXPECT_LE(wall(poses.of_row(y) * (0.005 * depth.at<ushort>(y, x) * ray)).distance_mm,
+                0.0025 + kSingle);
+    }
+  EXPECT_GE(off_axis, 10);
+}
+
+TEST_F(Export, DepthThatIsTooFarIsCounted) {
+  const fs::path out = exported(polynomial(), {"tum", 3000.0});  // up to 21.8 mm
+  EXPECT_TRUE(noted("pixels are farther than 21.8"));
+  const cv::Mat depth = cv::imread((out / "depth" / "000002.png").string(), cv::IMREAD_UNCHANGED);
+  const cv::Mat depth_mm = Truth::open(polynomial()).depth_mm(2);
+  int far = 0;
+  for (int y = 0; y < depth.rows; ++y)
+    for (int x = 0; x < depth.cols; ++x) {
+      const bool known = depth.at<ushort>(y, x) > 0;
+      EXPECT_EQ(known, 3000.0 * depth_mm.at<float>(y, x) < 65535.5);
+      far += known ? 0 : 1;
+    }
+  EXPECT_GE(far, 100);
+}
+
 TEST_F(Export, AFieldStopIsAMaskOfNerfstudio) {
   const fs::path out = exported(fisheye(), {"nerfstudio"});
   const Json transforms = Json::parse(read_text(out / "transforms.json"));
@@ -243,6 +279,12 @@ TEST_F(Export, AFieldStopIsAMaskOfNerfstudio) {
   const cv::Mat mask = cv::imread((out / "mask.png").string(), cv::IMREAD_UNCHANGED);
   EXPECT_EQ(mask.at<uchar>(60, 80), 255);
   EXPECT_EQ(mask.at<uchar>(0, 0), 0);
+  const fs::path colmap = exported(fisheye(), {"colmap"});
+  EXPECT_EQ(read_text(colmap / "masks" / "000003.jpg.png"), read_text(out / "mask.png"));
+  const fs::path tum = exported(fisheye(), {"tum"});
+  EXPECT_TRUE(noted("field stop"));
+  EXPECT_TRUE(fs::exists(tum / "calibration_fisheye.txt"));
+  EXPECT_FALSE(fs::exists(tum / "calibration.txt"));
 }
 
 TEST_F(Export, TumListsHaveMetresAndTheUsualSteps) {
@@ -360,9 +402,10 @@ TEST_F(Export, GoesOnWhereItStoppedAndTakesNoOtherFolder) {
                            const fs::path& to) {
     return message_of([&] { export_dataset(dataset, options, to, progress); });
   };
-  const std::string other = out.string() +
-                            ": holds an export of another dataset, or in another format; choose "
-                            "another folder or remove it";
+  const std::string other =
+      out.string() +
+      ": holds another export (dataset, format or depth-per-mm differ); choose "
+      "another folder or remove it";
   EXPECT_EQ(refused(polynomial(), {"colmap"}, out), other);
   EXPECT_EQ(refused(polynomial(), {"tum", 50.0}, out), other);
   EXPECT_EQ(refused(fisheye(), {"tum"}, out), other);
@@ -375,8 +418,10 @@ TEST_F(Export, GoesOnWhereItStoppedAndTakesNoOtherFolder) {
             "c3vd");
   EXPECT_EQ(refused(polynomial(), {"c3vd", 5.0}, root_ / "new"),
             "depth-per-mm is 5, but c3vd has no choice of it");
-  EXPECT_EQ(refused(polynomial(), {"tum", -1.0}, root_ / "new"),
-            "depth-per-mm is -1, expected steps of depth a millimetre, 1 to 65535");
+  for (const double steps : {-1.0, 0.001, 1e6})
+    EXPECT_EQ(
+        refused(polynomial(), {"tum", steps}, root_ / "new"),
+        fmt::format("depth-per-mm is {}, expected steps of depth a millimetre, 1 to 65535", steps));
   EXPECT_EQ(refused(root_ / "mine", {"tum"}, root_ / "new"),
             (root_ / "mine").string() + ": not a dataset (no dataset.json)");
   EXPECT_FALSE(fs::exists(root_ / "new"));

@@ -63,6 +63,31 @@ class RigDatasets : public testing::Test {
   SimulateOptions options_;
 };
 
+// A planned path keeps as clear as the widest of them needs.
+TEST_F(RigDatasets, CamerasOfOtherSizesFlyTheSamePath) {
+  std::string big = read_text(root_ / "small.yaml");
+  big.replace(big.find("diameter_mm: 4"), 14, "diameter_mm: 13");
+  write_atomic(root_ / "big.yaml", big);
+  write_atomic(root_ / "unlike.yaml",
+               "kind: rig\ncameras:\n"
+               "  - {name: left, camera: small.yaml}\n"
+               "  - {name: right, camera: big.yaml, position_mm: [2, 0, 1]}\n");
+  write_atomic(root_ / "planned.yaml", "like: '1'\nlength_cm: 8\npasses: 1\nclearance_mm: 4\n");
+  options_.scene = "stomach";
+  options_.camera = (root_ / "unlike.yaml").string();
+  options_.trajectory = (root_ / "planned.yaml").string();
+  options_.frames = 2;
+  options_.render.labels = false;
+  run();
+  const Rig rig = load_rig(options_.camera);
+  const Truth left = Truth::open(root_ / "out" / "left"),
+              right = Truth::open(root_ / "out" / "right");
+  for (int i = 0; i < left.size(); ++i) {
+    const Rigid3 expected = left.track()[i].world_from_camera * rig.cameras[1].capsule_from_camera;
+    EXPECT_LE((expected.translation - right.track()[i].world_from_camera.translation).norm(), 1e-9);
+  }
+}
+
 TEST_F(RigDatasets, PosesKeepToTheCapsule) {
   EXPECT_EQ(run().frames, 6);
   const Rig rig = load_rig(options_.camera);

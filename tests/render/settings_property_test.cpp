@@ -115,7 +115,7 @@ class SettingsRender : public testing::Test {
                  "{lens: {width: 32, height: 24, horizontal_fov_deg: 90}, "
                  "focus: {f_number: 4, distance_mm: 20}, "
                  "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 9000, "
-                 "read_noise_e: 5, shutter: rolling}}\n");
+                 "read_noise_e: 5, prnu: 0.01, dsnu_e: 3, shutter: rolling}}\n");
     PoseTrack track;
     for (int i = 0; i < 3; ++i)
       track.push_back({i / 30.0, Rigid3(Quat(Eigen::AngleAxisd(0.05 * i, Vec3::UnitY())),

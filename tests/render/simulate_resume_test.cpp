@@ -5,6 +5,7 @@
 
 #include "dataset/frame_list.h"
 #include "dataset/layout.h"
+#include "tests/message_of.h"
 #include "tests/render/simulate_fixture.h"
 
 namespace rugae {
@@ -27,6 +28,41 @@ TEST_F(Simulate, AKilledRunGoesOn) {
   EXPECT_EQ(nothing_left.frames, 0);
   EXPECT_EQ(nothing_left.skipped, 7);
   expect_same("whole", "killed");
+}
+
+// Noise does not move the path: nothing else on disk would differ.
+TEST_F(Simulate, ATrajectoryOfOtherNoiseIsAnotherDataset) {
+  write_atomic(root_ / "path.yaml", "file: track.txt\nclearance_mm: 5\nread_noise_factor: 5\n");
+  run("noisy");
+  fs::remove(DatasetLayout{root_ / "noisy"}.manifest());
+  write_atomic(root_ / "path.yaml", "file: track.txt\nclearance_mm: 5\n");
+  EXPECT_NE(message_of([&] { run("noisy"); }).find("holds another dataset"), std::string::npos);
+}
+
+TEST_F(Simulate, LostTrackPointsAreWrittenAgain) {
+  options_.render.truth.tracks = 50;
+  run("tracked");
+  const fs::path points = DatasetLayout{root_ / "tracked"}.track_points();
+  const std::string bytes = read_text(points);
+  fs::remove(points);
+  EXPECT_EQ(run("tracked").frames, 0);
+  EXPECT_EQ(read_text(points), bytes);
+}
+
+TEST_F(Simulate, APlannedPathKeepsLightsOutOfTheWall) {
+  std::string camera = read_text(options_.camera);
+  write_atomic(options_.camera, camera + "lights: [{offset_mm: [12, 0, 0]}]\n");
+  write_atomic(root_ / "planned.yaml", "like: '1'\nlength_cm: 8\npasses: 1\n");
+  options_.scene = "stomach";
+  options_.trajectory = (root_ / "planned.yaml").string();
+  options_.frames = 2;
+  EXPECT_GE(run("lit").min_clearance_mm, 12.5);
+}
+
+TEST_F(Simulate, PatternsThatACameraHasNotAreRefused) {
+  options_.render.sensor.dsnu = true;
+  EXPECT_EQ(message_of([&] { run("patterned"); }),
+            "camera 'small' has no dsnu_e, which sensor.dsnu needs");
 }
 
 class Resume : public Simulate {

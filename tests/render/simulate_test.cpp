@@ -203,6 +203,9 @@ TEST_F(Simulate, BlurAndDefocusLeaveTheLabelsSharp) {
 }
 
 TEST_F(Simulate, EveryOutputReadsBack) {
+  std::string camera = read_text(options_.camera);
+  camera.replace(camera.find("shutter"), 0, "prnu: 0.01, ");
+  write_atomic(options_.camera, camera);
   options_.frames = 3;
   options_.render.sensor.bayer = Bayer::gbrg;
   options_.render.sensor.prnu = true;
@@ -303,6 +306,7 @@ TEST_F(Simulate, AFisheyeSeesBeyondARightAngle) {
   write_atomic(root_ / "camera.yaml",
                "name: wide\nframes_in_paper: 6\n"
                "lens: {model: kannala_brandt, width: 64, height: 64, horizontal_fov_deg: 140}\n"
+               "vignetting: {cos4: false}\n"
                "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 9000, "
                "read_noise_e: 5, shutter: global}\n");
   options_.render.truth.labels.range = true;

@@ -132,8 +132,7 @@ TEST_F(Evaluate, TheWallSeenIsThatOfEachFramesOwnDepth) {
 TEST_F(Evaluate, TheSameFilesFromAnotherProgramHaveTheSameErrors) {
   const json ours = metrics(0.05, inside_sphere::kRadius_mm + 1.0);
   const EstimateLayout layout{folder_ / "estimate"};
-  const ForeignFiles files{layout.trajectory(), layout.map_ply(), layout.depth_folder(), 20.0,
-                           20.0};
+  const ForeignFiles files{layout.trajectory(), layout.map_ply(), layout.depth_folder(), 20.0};
   Progress progress(Progress::Output::silent);
   const json theirs = evaluate(folder_ / "data", files, progress);
   const auto expect_near = [](const json& a, const json& b) {
@@ -155,6 +154,11 @@ TEST_F(Evaluate, TheSameFilesFromAnotherProgramHaveTheSameErrors) {
   EXPECT_TRUE(theirs.at("depth").at("as_given").at("abs_rel").get<double>() <= 1e-6);
   EXPECT_EQ(theirs.at("depth").at("as_given").at("frames"), 4);
   EXPECT_FALSE(ours.at("depth").contains("as_given"));
+  EXPECT_TRUE(theirs.at("time").at("reconstruct_s").is_null());
+  // In whatever unit: the trajectory's is the depth's.
+  const json unscaled = evaluate(
+      folder_ / "data", ForeignFiles{layout.trajectory(), {}, layout.depth_folder()}, progress);
+  expect_near(ours.at("depth").at("sim3"), unscaled.at("depth").at("sim3"));
 }
 
 TEST_F(Evaluate, DepthAloneIsMeasuredAndSoIsItsScale) {
@@ -169,7 +173,7 @@ TEST_F(Evaluate, DepthAloneIsMeasuredAndSoIsItsScale) {
   }
   Progress progress(Progress::Output::silent);
   const json m =
-      evaluate(folder_ / "data", ForeignFiles{.depth = depth, .depth_mm_per_unit = 0.01}, progress);
+      evaluate(folder_ / "data", ForeignFiles{.depth = depth, .depth_scale = 0.01}, progress);
   EXPECT_NEAR(m.at("depth").at("as_given").at("abs_rel").get<double>(), 0.1, 1e-3);
   EXPECT_TRUE(m.at("depth").at("median_scaled").at("abs_rel").get<double>() <= 1e-3);
   EXPECT_TRUE(m.at("depth").at("sim3").is_null());
@@ -197,6 +201,10 @@ TEST_F(Evaluate, ForeignFilesThatDoNotFitAreNamed) {
   fs::rename(depth / "a3.exr", depth / "a3_16bit.exr");
   EXPECT_EQ(refused({.depth = depth}),
             (depth / "a3_16bit.exr").string() + ": expected one number in the name, its frame's");
+  inside_sphere::write_dataset(folder_ / "bare", {.labelled = false});
+  EXPECT_EQ(message_of([&] { evaluate(folder_ / "bare", ForeignFiles{.depth = depth}, progress); }),
+            (folder_ / "bare").string() + ": made without depth, there is nothing to measure " +
+                depth.string() + " against");
   EXPECT_EQ(refused({.trajectory = trajectory, .mm_per_unit = -1.0}),
             "mm-per-unit is -1, expected above 0");
   EXPECT_EQ(refused({.map = "map.ply", .depth = depth}),
@@ -204,8 +212,8 @@ TEST_F(Evaluate, ForeignFilesThatDoNotFitAreNamed) {
   write_atomic(folder_ / "late.txt", "0.02 0 0 0 0 0 0 1\n");
   EXPECT_EQ(refused({.trajectory = folder_ / "late.txt"}),
             (folder_ / "late.txt").string() +
-                ": a pose at 0.02 s, expected the times of frames, the nearest is "
-                "0.03333333333333333 s");
+                ": a pose at 0.02 s, expected the times of frames to within 0.0017 s, the nearest "
+                "is 0.03333333333333333 s");
 }
 
 TEST_F(Evaluate, AnEstimateOfOtherFramesIsAnError) {

@@ -108,6 +108,7 @@ TEST_F(ReportWithTree, HoldsItsViewerAndTheDataOfItsViews) {
 
 TEST(Html, EscapesAndRounds) {
   EXPECT_EQ(html::escape("a<b & \"c\""), "a&lt;b &amp; &quot;c&quot;");
+  EXPECT_EQ(html::link_to("noise 50%_1-a"), "#noise%2050%25_1-a");
   EXPECT_EQ(html::number(41.74), "41.7");
   EXPECT_EQ(html::number(0.012345), "0.0123");
   EXPECT_EQ(html::number(1234.5), "1234");

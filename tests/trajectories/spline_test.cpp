@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "core/check.h"
 #include "core/random.h"
 #include "core/units.h"
 #include "trajectories/time_law.h"
@@ -69,6 +70,20 @@ TEST(Spline, GoesThroughGivenPoints) {
     EXPECT_LE((spline_value(control, i) - points[i]).norm(), 1e-11);
     EXPECT_LE((spline_rotation(turns, i).conjugate() * rotations[i]).vec().norm(), 1e-11);
   }
+}
+
+// One that would be missed by degrees is no spline through the rotations.
+TEST(Spline, RotationsThatTurnTooFarAreRefused) {
+  const auto yaws = [](std::vector<double> degrees) {
+    std::vector<Quat> rotations;
+    for (const double yaw : degrees) rotations.push_back(turn(Vec3::UnitY(), yaw * kPi / 180.0));
+    return rotations;
+  };
+  const std::vector<Quat> near = yaws({0, 0, 45, 0, 0});
+  const std::vector<Quat> control = interpolating_controls(near);
+  for (int k = 0; k < 5; ++k)
+    EXPECT_LE(angle_between_rad(spline_rotation(control, k), near[k]), 1e-7);
+  EXPECT_THROW(interpolating_controls(yaws({0, 0, 90, 0, 0})), Error);
 }
 
 TEST(Spline, ArcLengthOfACircle) {

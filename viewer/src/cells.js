@@ -1,6 +1,16 @@
 // A row whose first cell links into the page is a link as a whole.
 
-const targetOf = (link) => document.getElementById(decodeURIComponent(link.getAttribute("href").slice(1)));
+/** The name in "#name"; one that is not percent-encoded stands for itself. */
+export function fragment(address) {
+  const name = address.slice(1);
+  try {
+    return decodeURIComponent(name);
+  } catch {
+    return name;
+  }
+}
+
+const targetOf = (link) => document.getElementById(fragment(link.getAttribute("href")));
 
 /** Opens the row's cell (a <details>) and goes there; a click on a link or on selected text does what it always does. */
 export function openCellsByRow(root) {

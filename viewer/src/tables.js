@@ -28,10 +28,21 @@ export function sortedOrder(texts, descending) {
   });
 }
 
+/** What a cell is sorted by: its first line where that is a number or a dash (small print stands below), else all of it. */
+export function valueText(cell) {
+  let first = "";
+  for (const node of cell?.childNodes ?? []) {
+    if (node.nodeName === "BR") break;
+    first += node.textContent;
+  }
+  const measured = numberIn(first) !== null || kDashes.has(first.trim());
+  return measured ? first : cell?.textContent ?? "";
+}
+
 function sortBy(table, column, descending) {
   const body = table.tBodies[0];
   const rows = [...body.rows];
-  const order = sortedOrder(rows.map((row) => row.cells[column]?.textContent ?? ""), descending);
+  const order = sortedOrder(rows.map((row) => valueText(row.cells[column])), descending);
   body.append(...order.map((i) => rows[i]));
 }
 

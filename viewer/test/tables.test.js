@@ -3,7 +3,8 @@
 import assert from "node:assert/strict";
 import {test} from "node:test";
 
-import {numberIn, sortedOrder} from "../src/tables.js";
+import {fragment} from "../src/cells.js";
+import {numberIn, sortedOrder, valueText} from "../src/tables.js";
 
 const sorted = (texts, descending = false) => sortedOrder(texts, descending).map((i) => texts[i]);
 
@@ -31,4 +32,20 @@ test("one text makes the column text; numbers inside texts still count", () => {
 test("equals keep their order", () => {
   assert.deepEqual(sortedOrder(["1.0", "1", "0"], false), [2, 0, 1]);
   assert.deepEqual(sortedOrder(["1.0", "1", "0"], true), [0, 1, 2]);
+});
+
+test("small print below a value does not sort", () => {
+  const cell = (...lines) => ({
+    childNodes: lines.flatMap((line, i) => (i > 0 ? [{nodeName: "BR", textContent: ""}] : []).concat({nodeName: "#text", textContent: line})),
+    textContent: lines.join(""),
+  });
+  assert.equal(valueText(cell("850", "1 failed")), "850");
+  assert.equal(valueText(cell("\u2013", "2 failed")), "\u2013");
+  assert.equal(valueText(cell("paper", "wetness 0.5")), "paperwetness 0.5");
+  assert.equal(valueText(undefined), "");
+});
+
+test("a link's name is decoded, and one that cannot be stands for itself", () => {
+  assert.equal(fragment("#noise-50%25_1"), "noise-50%_1");
+  assert.equal(fragment("#noise-50%_1"), "noise-50%_1");
 });

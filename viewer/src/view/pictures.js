@@ -29,6 +29,7 @@ export class Pictures {
     for (const {name, image} of this.labels) {
       image.classList.toggle("absent", !pictures[name]);
       if (pictures[name]) image.src = pictures[name];
+      else image.removeAttribute("src");
     }
     const wanted = pictures.frame;
     this.frame.decode().then(() => {

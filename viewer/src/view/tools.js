@@ -18,5 +18,5 @@ const css = ([r, g, b]) => `rgb(${[r, g, b].map((v) => Math.round(255 * v)).join
 export function colourBar(title, colours, worst_mm) {
   return element("div", {class: "colour-bar"}, element("span", {}, title),
                  element("i", {style: `background:linear-gradient(to right, ${colours.map(css).join(", ")})`}),
-                 element("span", {class: "ends"}, element("span", {}, "0"), element("span", {}, `${worst_mm} mm +`)));
+                 element("span", {class: "ends"}, element("span", {}, "0"), element("span", {}, `${Number(worst_mm.toPrecision(4))} mm +`)));
 }
