@@ -212,12 +212,13 @@ Camera load_camera(const std::string& name_or_path) {
   camera.lights = read_lights(yaml);
   yaml.finish();
   const double w = camera.lens.width, h = camera.lens.height;
-  for (const Vec2& corner : {Vec2(0, 0), Vec2(w, 0), Vec2(0, h), Vec2(w, h)})
-    check(!camera.lens.passes_stop(corner) ||
-              vignette_at(camera.vignetting, camera.lens, corner) > 0.0,
-          "{}: vignetting leaves no light at the image corner ({}, {}){}", yaml.where("vignetting"),
-          corner.x(), corner.y(),
-          camera.vignetting.cos4 ? "; a lens that sees beyond 90 degrees has cos4: false" : "");
+  for (const Vec2& corner : {Vec2(0, 0), Vec2(w, 0), Vec2(0, h), Vec2(w, h)}) {
+    // Beyond 90 degrees cos^4 is 0: dark, but no mistake.
+    const auto ray = camera.lens.unproject(corner);
+    check((ray && !(ray->z() > 0.0)) || vignette_at(camera.vignetting, camera.lens, corner) > 0.0,
+          "{}: vignetting leaves no light at the image corner ({}, {})", yaml.where("vignetting"),
+          corner.x(), corner.y());
+  }
   check_fall_off(camera, yaml.where("vignetting"));
   return camera;
 }
@@ -297,7 +298,8 @@ std::string quoted(const std::string& name) {
   const auto plain = [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.' || c == '/';
   };
-  if (!name.empty() && std::ranges::all_of(name, plain)) return name;
+  const bool null = name == "null" || name == "Null" || name == "NULL";
+  if (!name.empty() && !null && std::ranges::all_of(name, plain)) return name;
   return nlohmann::json(name).dump();
 }
 

@@ -104,8 +104,8 @@ Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajecto
   double clearance_mm =
       std::max(trajectory.clearance_mm, 0.5 * std::max(camera.diameter_mm, mount.diameter_mm)) +
       mount.reach_mm;
-  // A light in the wall would leave everything dark.
-  for (const Emitter& light : camera.lights)
+  // A light in the wall would leave everything dark. A rig's reach has the lights in it.
+  for (const Emitter& light : mount.reach_mm > 0.0 ? std::vector<Emitter>() : camera.lights)
     clearance_mm = std::max(clearance_mm, light.offset_mm.norm() + kLightClearance_mm);
   at_rest.clearance_mm = clearance_mm;
   if (trajectory.file.empty()) at_rest.clearance_mm += scene.motion_reach_mm;

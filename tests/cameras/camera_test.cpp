@@ -32,7 +32,7 @@ class CameraFile : public ::testing::Test {
 
 TEST_F(CameraFile, NamesReadBackWhateverTheyAre) {
   for (const std::string name :
-       {"misumi-v5506", "Misumi: left", "#3", "[a]", "", "a \"b\"", "50 %"}) {
+       {"misumi-v5506", "Misumi: left", "#3", "[a]", "null", "", "a \"b\"", "50 %"}) {
     Camera camera = read(std::string(kLens) + kSensor);
     camera.name = name;
     EXPECT_EQ(read(camera_yaml(camera)).name, name);
@@ -49,10 +49,21 @@ TEST_F(CameraFile, FallOffIsAboveZeroAllOver) {
   // 1 in the middle and at the corner, below 0 between them.
   EXPECT_NE(refused(std::string(kLens) + "vignetting: {v1: -5, v2: 5}\n").find("expected above 0"),
             std::string::npos);
+  EXPECT_NE(
+      refused(std::string(kLens) + "vignetting: {v1: -2}\n").find("no light at the image corner"),
+      std::string::npos);
+}
+
+// Natural fall-off ends at 90 degrees: an even power would rise again behind.
+TEST_F(CameraFile, NoLightComesFromBehind) {
   const std::string fisheye =
       "lens: {model: kannala_brandt, width: 64, height: 64, horizontal_fov_deg: 200}\n";
-  EXPECT_NE(refused(fisheye).find("cos4: false"), std::string::npos);
-  EXPECT_EQ(refused(fisheye + "vignetting: {cos4: false}\n"), "no error");
+  const Camera natural = read(fisheye + kSensor);
+  const Camera even = read(fisheye + kSensor + "vignetting: {cos4: false}\n");
+  const Vec2 ahead(32.0, 30.0), behind(1.0, 1.0);
+  EXPECT_GT(vignette_at(natural.vignetting, natural.lens, ahead), 0.9);
+  EXPECT_EQ(vignette_at(natural.vignetting, natural.lens, behind), 0.0);
+  EXPECT_EQ(vignette_at(even.vignetting, even.lens, behind), 1.0);
 }
 
 }  // namespace

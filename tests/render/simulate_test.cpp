@@ -306,7 +306,6 @@ TEST_F(Simulate, AFisheyeSeesBeyondARightAngle) {
   write_atomic(root_ / "camera.yaml",
                "name: wide\nframes_in_paper: 6\n"
                "lens: {model: kannala_brandt, width: 64, height: 64, horizontal_fov_deg: 140}\n"
-               "vignetting: {cos4: false}\n"
                "sensor: {pixel_pitch_um: 3, fps: 30, bit_depth: 10, full_well_e: 9000, "
                "read_noise_e: 5, shutter: global}\n");
   options_.render.truth.labels.range = true;
