@@ -116,6 +116,16 @@ TEST(Summary, ThePageHasOursAndThePublished) {
   EXPECT_EQ(summary_part({}), "");
 }
 
+TEST(Summary, ThePageKeepsTheDecimalsOfAnAxis) {
+  SummarySpecs specs;
+  specs.tables = {{"ATE", "trajectory.ate_mm", "mm", 1.0, "strength", "trajectory", ""}};
+  const std::string page = summary_part(
+      summarise(specs, {cell("paths/slow.yaml", "0.25", 1), cell("paths/slow.yaml", "0.5", 2)}));
+  EXPECT_NE(page.find(">0.25<"), std::string::npos) << page;
+  EXPECT_NE(page.find(">0.5<"), std::string::npos) << page;
+  EXPECT_NE(page.find(">slow<"), std::string::npos) << page;  // trajectories by their names
+}
+
 TEST(Published, NumbersOfThePaper) {
   EXPECT_DOUBLE_EQ(published("ate", "6", "awaiba-naneye").value(), 87.3);
   // By the names of studies/presets/preprocessing.yaml.
