@@ -173,15 +173,15 @@ void add_reconstruct(CLI::App& app) {
 
 void add_evaluate(CLI::App& app) {
   struct Arguments {
-    fs::path dataset, estimate, out;
-    ForeignFiles files;  // of another program
+    fs::path dataset, out;
+    EstimateFiles files;
     bool json = false;
   };
   const auto a = std::make_shared<Arguments>();
   CLI::App& command =
       *app.add_subcommand("evaluate", "Measure an estimate against the exact truth");
   command.add_option("dataset", a->dataset, "The dataset with its truth")->required();
-  command.add_option("estimate", a->estimate,
+  command.add_option("estimate", a->files.trajectory,
                      "What reconstruct wrote, or a trajectory of another program: TUM, "
                      "world_from_camera, at the frames' times");
   command.add_option("--map", a->files.map, "Its map: any mesh, in the trajectory's world");
@@ -199,15 +199,7 @@ void add_evaluate(CLI::App& app) {
     if (a->out.has_parent_path()) make_folder(a->out.parent_path());
     Progress::catch_interrupts();
     Progress progress;
-    const bool ours = fs::is_directory(a->estimate);
-    check(!ours || (a->files.map.empty() && a->files.depth.empty() && a->files.mm_per_unit == 1.0 &&
-                    a->files.depth_scale == 1.0),
-          "{}: an estimate has its own map, depth and unit; --map, --depth and their units go with "
-          "a trajectory",
-          a->estimate.string());
-    if (!ours) a->files.trajectory = a->estimate;
-    const nlohmann::json metrics = ours ? evaluate(a->dataset, a->estimate, progress)
-                                        : evaluate(a->dataset, a->files, progress);
+    const nlohmann::json metrics = evaluate(a->dataset, a->files, progress);
     if (!a->out.empty()) write_atomic(a->out, metrics.dump(2) + "\n");
     print(a->json, metrics, summary_text(metrics));
   });

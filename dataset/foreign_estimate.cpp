@@ -79,7 +79,7 @@ std::map<int, fs::path> foreign_depth_files(const fs::path& folder, int frames) 
   std::map<int, fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const fs::path& file = entry.path();
-    const std::string extension = file.extension().string();
+    const std::string extension = lower_extension(file);
     if (extension != ".exr" && extension != ".png") continue;
     const int frame = number_in(file);
     check(frame < frames, "{}: frame {}, the dataset has 0 to {}", file.string(), frame,

@@ -20,13 +20,6 @@ namespace rugae {
 namespace fs = std::filesystem;
 namespace {
 
-std::string lower_extension(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
-
 bool is_jpeg(const std::string& extension) { return extension == ".jpg" || extension == ".jpeg"; }
 bool is_tiff(const std::string& extension) { return extension == ".tif" || extension == ".tiff"; }
 
@@ -56,6 +49,13 @@ cv::Mat decode(const fs::path& file, int flags) {
 }
 
 }  // namespace
+
+std::string lower_extension(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
 
 bool has_image_extension(const fs::path& file) {
   const std::string extension = lower_extension(file);

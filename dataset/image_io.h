@@ -20,6 +20,8 @@ cv::Mat read_image_bgr(const std::filesystem::path& file);
 cv::Mat read_image_gray(const std::filesystem::path& file);
 /// Depth and channels as stored: for masks and 16-bit images.
 cv::Mat read_image_as_stored(const std::filesystem::path& file);
+/// "PNG" and "png" are one: the extension in lower case, with its dot.
+std::string lower_extension(const std::filesystem::path& file);
 /// True for the extensions read as images: png, jpg, jpeg, bmp, in any case.
 bool has_image_extension(const std::filesystem::path& file);
 

@@ -3,7 +3,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cstring>
 #include <opencv2/core.hpp>
 
@@ -29,13 +28,6 @@ const std::vector<std::string> kPoses = {
     "gt.txt",         "trajectory.tum",  "truth/trajectory.txt"};
 const std::vector<std::string> kCalibration = {"calibration.yaml", "camera.yaml", "calib.yaml",
                                                "lens.yaml", "observations/calibration.yaml"};
-
-std::string lower_extension(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
 
 // What was told (it must be there), or the first of the usual names that is there, or nothing.
 fs::path find(const fs::path& root, const fs::path& told, const std::vector<std::string>& names) {

@@ -1,6 +1,5 @@
 #include <nlohmann/json.hpp>
 
-#include "core/check.h"
 #include "core/sim3.h"
 #include "python/arrays.h"
 #include "validate/evaluate.h"
@@ -25,16 +24,8 @@ py::object metrics(const std::string& dataset, const std::string& estimate, cons
   {
     py::gil_scoped_release others_may_run;
     Progress silent(Progress::Output::silent);
-    const bool ours = std::filesystem::is_directory(estimate);
-    check(!ours || (map.empty() && depth.empty() && mm_per_unit == 1.0 && depth_scale == 1.0),
-          "{}: an estimate has its own map, depth and unit; map, depth and their units go with a "
-          "trajectory",
-          estimate);
-    const nlohmann::json found =
-        ours ? evaluate(dataset, std::filesystem::path(estimate), silent)
-             : evaluate(dataset, ForeignFiles{estimate, map, depth, mm_per_unit, depth_scale},
-                        silent);
-    text = found.dump();
+    const EstimateFiles files{estimate, map, depth, mm_per_unit, depth_scale};
+    text = evaluate(dataset, files, silent).dump();
   }
   return py::module_::import("json").attr("loads")(text);
 }

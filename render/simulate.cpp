@@ -105,8 +105,9 @@ Path find_path(const SimulateOptions& options, const TrajectoryOptions& trajecto
       std::max(trajectory.clearance_mm, 0.5 * std::max(camera.diameter_mm, mount.diameter_mm)) +
       mount.reach_mm;
   // A light in the wall would leave everything dark. A rig's reach has the lights in it.
-  for (const Emitter& light : mount.reach_mm > 0.0 ? std::vector<Emitter>() : camera.lights)
-    clearance_mm = std::max(clearance_mm, light.offset_mm.norm() + kLightClearance_mm);
+  if (mount.reach_mm == 0.0)
+    for (const Emitter& light : camera.lights)
+      clearance_mm = std::max(clearance_mm, light.offset_mm.norm() + kLightClearance_mm);
   at_rest.clearance_mm = clearance_mm;
   if (trajectory.file.empty()) at_rest.clearance_mm += scene.motion_reach_mm;
   const PlannedPath path = plan_path(scene.wall, at_rest, options.seed);
@@ -213,12 +214,10 @@ SimulateResult simulate_mounted(const SimulateOptions& options, const Mount& mou
   check(!options.render.lens.defocus || camera.focus.f_number > 0.0,
         "camera '{}' has no focus (f_number and distance_mm), which lens.defocus needs",
         camera.name);
-  const auto check_pattern = [&](bool wanted, double spread, const char* key) {
-    check(!wanted || spread > 0.0, "camera '{}' has no {}, which sensor.{} needs", camera.name, key,
-          std::string_view(key).substr(0, 4));
-  };
-  check_pattern(options.render.sensor.prnu, camera.sensor.prnu, "prnu");
-  check_pattern(options.render.sensor.dsnu, camera.sensor.dsnu_e, "dsnu_e");
+  check(!options.render.sensor.prnu || camera.sensor.prnu > 0.0,
+        "camera '{}' has no prnu, which sensor.prnu needs", camera.name);
+  check(!options.render.sensor.dsnu || camera.sensor.dsnu_e > 0.0,
+        "camera '{}' has no dsnu_e, which sensor.dsnu needs", camera.name);
   const TrajectoryOptions trajectory = load_trajectory(options.trajectory);
   make_folder(out);  // a folder that cannot be is said before the long work, not after
   const Scene scene = load_scene({options.scene, options.seed, options.resolution, trajectory.oil});

@@ -274,7 +274,11 @@ json evaluate(const fs::path& dataset, const fs::path& estimate_folder, Progress
   return metrics_of(truth, measured, progress);
 }
 
-void ForeignFiles::check() const {
+void EstimateFiles::check() const {
+  const bool more = !map.empty() || !depth.empty() || mm_per_unit != 1.0 || depth_scale != 1.0;
+  rugae::check(!is_ours() || !more,
+               "{}: an estimate has its own map, depth and unit; others' go with a trajectory",
+               trajectory.string());
   rugae::check(
       !trajectory.empty() || !depth.empty(),
       "neither a path nor depth to measure: expected an estimate's folder, a trajectory in "
@@ -287,8 +291,9 @@ void ForeignFiles::check() const {
                "depth-scale is {}, expected above 0", depth_scale);
 }
 
-json evaluate(const fs::path& dataset, const ForeignFiles& files, Progress& progress) {
+json evaluate(const fs::path& dataset, const EstimateFiles& files, Progress& progress) {
   files.check();
+  if (files.is_ours()) return evaluate(dataset, files.trajectory, progress);
   const Truth truth = Truth::open(dataset);
   check(files.depth.empty() || truth.has_label("depth"),
         "{}: made without depth, there is nothing to measure {} against", dataset.string(),

@@ -62,14 +62,16 @@ std::vector<std::string> export_colmap(const ExportSource& source, Progress& pro
   const auto names = write_frames(source, "images", std::nullopt, progress, notes);
   if (source.lens().stop.shape != StopShape::full) {  // for --ImageReader.mask_path
     make_folder(source.out / "masks");
+    const cv::Mat mask = stop_mask(source.lens());
     for (const std::string& name : names)
       write_once(source.out / "masks" / (name + ".png"),
-                 [&](const fs::path& file) { write_image(file, stop_mask(source.lens())); });
+                 [&](const fs::path& file) { write_image(file, mask); });
     notes.push_back("masks/ has the field stop, for --ImageReader.mask_path");
   }
   const WallPoints wall(source, progress);
   progress.begin("sparse model", names.size());
-  std::vector<std::string> tracks(wall.points().size());  // "image, its how manieth point" each
+  std::vector<std::string> tracks(
+      wall.points().size());  // " image, place among its points" for each that sees it
   LongText list(sparse / "images.txt");
   list.add("# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# POINTS2D[] as X Y POINT3D_ID\n");
   for (int frame = 0; frame < source.frames(); ++frame) {

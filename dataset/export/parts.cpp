@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <opencv2/core.hpp>
 
 #include "core/in_lots.h"
@@ -27,17 +28,16 @@ std::string DepthCode::text() const {
 
 namespace {
 
-// Beyond 90 degrees off the axis both z are negative.
-cv::Mat along_rays(const cv::Mat& depth_mm, const Lens& lens) {
+// Of each pixel's unit ray, CV_32F: depth over it is the distance along the ray. Beyond 90 degrees
+// off the axis both are negative. Not a number where the lens has no ray.
+cv::Mat ray_z(const Lens& lens) {
   const LensProjector projector(lens);
-  cv::Mat range_mm(depth_mm.size(), CV_32F);
-  for (int y = 0; y < depth_mm.rows; ++y)
-    for (int x = 0; x < depth_mm.cols; ++x) {
-      const auto ray = projector.unproject({x + 0.5, y + 0.5});
-      range_mm.at<float>(y, x) =
-          ray ? static_cast<float>(depth_mm.at<float>(y, x) / ray->z()) : 0.0f;
-    }
-  return range_mm;
+  cv::Mat z(lens.height, lens.width, CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
+  for (int y = 0; y < z.rows; ++y)
+    for (int x = 0; x < z.cols; ++x)
+      if (const auto ray = projector.unproject({x + 0.5, y + 0.5}))
+        z.at<float>(y, x) = static_cast<float>(ray->z());
+  return z;
 }
 
 // How many pixels are too far is added to `too_far`.
@@ -64,6 +64,7 @@ std::vector<std::string> write_frames(const ExportSource& source, const std::str
   if (depth) make_folder(source.out / "depth");
   std::vector<std::string> names(source.frames());
   std::atomic<std::size_t> too_far = 0;
+  const cv::Mat z = depth && depth->along_ray ? ray_z(source.lens()) : cv::Mat();
   progress.begin("frames", names.size());
   do_in_lots(names.size(), kExportLot, progress, [&](std::size_t i) {
     const int frame = static_cast<int>(i);
@@ -71,9 +72,9 @@ std::vector<std::string> write_frames(const ExportSource& source, const std::str
     names[i] = copy_frame(source, frame, source.out / images / stem);
     if (!depth) return;
     write_once(source.out / "depth" / (stem + ".png"), [&](const auto& file) {
-      const cv::Mat z_mm = source.truth.depth_mm(frame);
-      write_image(file, coded(depth->along_ray ? along_rays(z_mm, source.lens()) : z_mm,
-                              depth->per_mm, too_far));
+      cv::Mat depth_mm = source.truth.depth_mm(frame);
+      if (depth->along_ray) cv::divide(depth_mm, z, depth_mm);
+      write_image(file, coded(depth_mm, depth->per_mm, too_far));
     });
   });
   if (too_far > 0)

@@ -132,7 +132,7 @@ TEST_F(Evaluate, TheWallSeenIsThatOfEachFramesOwnDepth) {
 TEST_F(Evaluate, TheSameFilesFromAnotherProgramHaveTheSameErrors) {
   const json ours = metrics(0.05, inside_sphere::kRadius_mm + 1.0);
   const EstimateLayout layout{folder_ / "estimate"};
-  const ForeignFiles files{layout.trajectory(), layout.map_ply(), layout.depth_folder(), 20.0};
+  const EstimateFiles files{layout.trajectory(), layout.map_ply(), layout.depth_folder(), 20.0};
   Progress progress(Progress::Output::silent);
   const json theirs = evaluate(folder_ / "data", files, progress);
   const auto expect_near = [](const json& a, const json& b) {
@@ -157,7 +157,7 @@ TEST_F(Evaluate, TheSameFilesFromAnotherProgramHaveTheSameErrors) {
   EXPECT_TRUE(theirs.at("time").at("reconstruct_s").is_null());
   // In whatever unit: the trajectory's is the depth's.
   const json unscaled = evaluate(
-      folder_ / "data", ForeignFiles{layout.trajectory(), {}, layout.depth_folder()}, progress);
+      folder_ / "data", EstimateFiles{layout.trajectory(), {}, layout.depth_folder()}, progress);
   expect_near(ours.at("depth").at("sim3"), unscaled.at("depth").at("sim3"));
 }
 
@@ -173,7 +173,7 @@ TEST_F(Evaluate, DepthAloneIsMeasuredAndSoIsItsScale) {
   }
   Progress progress(Progress::Output::silent);
   const json m =
-      evaluate(folder_ / "data", ForeignFiles{.depth = depth, .depth_scale = 0.01}, progress);
+      evaluate(folder_ / "data", EstimateFiles{.depth = depth, .depth_scale = 0.01}, progress);
   EXPECT_NEAR(m.at("depth").at("as_given").at("abs_rel").get<double>(), 0.1, 1e-3);
   EXPECT_TRUE(m.at("depth").at("median_scaled").at("abs_rel").get<double>() <= 1e-3);
   EXPECT_TRUE(m.at("depth").at("sim3").is_null());
@@ -182,10 +182,10 @@ TEST_F(Evaluate, DepthAloneIsMeasuredAndSoIsItsScale) {
   EXPECT_EQ(m.at("surface").at("note"), "the estimate has no map");
 }
 
-TEST_F(Evaluate, ForeignFilesThatDoNotFitAreNamed) {
+TEST_F(Evaluate, EstimateFilesThatDoNotFitAreNamed) {
   metrics(1.0);
   Progress progress(Progress::Output::silent);
-  const auto refused = [&](const ForeignFiles& files) {
+  const auto refused = [&](const EstimateFiles& files) {
     return message_of([&] { evaluate(folder_ / "data", files, progress); });
   };
   const std::string trajectory = (folder_ / "estimate" / "trajectory.txt").string();
@@ -202,11 +202,15 @@ TEST_F(Evaluate, ForeignFilesThatDoNotFitAreNamed) {
   EXPECT_EQ(refused({.depth = depth}),
             (depth / "a3_16bit.exr").string() + ": expected one number in the name, its frame's");
   inside_sphere::write_dataset(folder_ / "bare", {.labelled = false});
-  EXPECT_EQ(message_of([&] { evaluate(folder_ / "bare", ForeignFiles{.depth = depth}, progress); }),
-            (folder_ / "bare").string() + ": made without depth, there is nothing to measure " +
-                depth.string() + " against");
+  EXPECT_EQ(
+      message_of([&] { evaluate(folder_ / "bare", EstimateFiles{.depth = depth}, progress); }),
+      (folder_ / "bare").string() + ": made without depth, there is nothing to measure " +
+          depth.string() + " against");
   EXPECT_EQ(refused({.trajectory = trajectory, .mm_per_unit = -1.0}),
             "mm-per-unit is -1, expected above 0");
+  EXPECT_EQ(refused({.trajectory = folder_ / "estimate", .mm_per_unit = 20.0}),
+            (folder_ / "estimate").string() +
+                ": an estimate has its own map, depth and unit; others' go with a trajectory");
   EXPECT_EQ(refused({.map = "map.ply", .depth = depth}),
             "map.ply: a map is placed by the trajectory, which is missing");
   write_atomic(folder_ / "late.txt", "0.02 0 0 0 0 0 0 1\n");
